@@ -13,9 +13,9 @@ from gms_fsm.errors import MissingExtraError, ParameterError
 from gms_fsm.foundation.arguments import checked_integer, checked_path, refusing, unknown
 from gms_fsm.foundation.files import output_folder
 from gms_fsm.foundation.quantities import wrapped
-from gms_fsm.generation.search import Goal, Search, Taken, Tried, firings_of, goals_of
+from gms_fsm.generation.search import Goal, MotionSearch, Taken, Tried, firings_of, goals_of
 from gms_fsm.generation.search import shown as shown_by
-from gms_fsm.generation.stand import CONTACT, MASS, SETTINGS, Motion, Stand
+from gms_fsm.generation.stand import CONTACT, MASS, SETTINGS, Drive, Stand
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.simulate import simulate
 from gms_fsm.session.tree.export import save_scenario
@@ -30,7 +30,7 @@ from gms_fsm.traces.coverage.counts import Score
 from gms_fsm.traces.coverage.reasons import lines
 from gms_fsm.traces.coverage.total import Coverage
 from gms_fsm.traces.trace import Trace
-from gms_fsm.verification.reaching.points import Guards, TurningPoint
+from gms_fsm.verification.reaching.points import GuardPoints, TurningPoint
 from gms_fsm.verification.reaching.unreachable import Nowhere, numbers_fit
 
 __all__ = ["Generated", "GeneratedRun", "Unreached", "generate"]
@@ -260,12 +260,12 @@ def generate(
         own = contact_of(chart, contact)[0]
     stand = Stand(own)
     inner = _inner(bounds)
-    guards = Guards(own, MASS, inner, checked_integer("seed", seed), stand.drives)
+    guards = GuardPoints(own, MASS, inner, checked_integer("seed", seed), stand.drives)
     for name in inner:
         if name not in (known := [*_bounded(stand, guards)]):
             raise unknown("name", name, known, place="bounds")
     reasons = _never(own)
-    search = Search(stand, guards, seed, reasons.keys())
+    search = MotionSearch(stand, guards, seed, reasons.keys())
     search.explore()
     chosen = _fewest(_candidates(stand, search)) or [_tried(stand, search.idle, search.strikes)]
     runs = tuple(_run(stand, each, search) for each in chosen)
@@ -304,7 +304,7 @@ def _inner(bounds: Mapping[str, tuple[float, float]] | None) -> dict[str, tuple[
     return found
 
 
-def _bounded(stand: Stand, guards: Guards) -> dict[str, str]:
+def _bounded(stand: Stand, guards: GuardPoints) -> dict[str, str]:
     """Return the names that have bounds, each with the signal behind it, if there is one."""
     found = {name: "" for name in guards.free if name not in guards.loads}
     for v, signal in stand.drives.items():
@@ -312,7 +312,9 @@ def _bounded(stand: Stand, guards: Guards) -> dict[str, str]:
     return found | {name: name for name in stand.inputs}
 
 
-def _bounds(stand: Stand, guards: Guards, search: Search) -> dict[str, tuple[float, float]]:
+def _bounds(
+    stand: Stand, guards: GuardPoints, search: MotionSearch
+) -> dict[str, tuple[float, float]]:
     found = {}
     for name, signal in _bounded(stand, guards).items():
         levels = [*guards.levels.get(name, ()), *search.sizes.levels.get(signal, ())]
@@ -341,7 +343,7 @@ def _never(contact: Contact) -> dict[Goal, str]:
     return found
 
 
-def _unreached(goal: Goal, reasons: Mapping[Goal, str], search: Search) -> Unreached:
+def _unreached(goal: Goal, reasons: Mapping[Goal, str], search: MotionSearch) -> Unreached:
     first, *others = reversed(goal.edges)
     what = f"{first.edge} from {first.source}" + "".join(f", after {each.edge}" for each in others)
     if goal in reasons:
@@ -350,7 +352,7 @@ def _unreached(goal: Goal, reasons: Mapping[Goal, str], search: Search) -> Unrea
 
 
 # --------------------------------------------------------------------------- which are kept
-def _candidates(stand: Stand, search: Search) -> list[tuple[Tried, Set[Goal]]]:
+def _candidates(stand: Stand, search: MotionSearch) -> list[tuple[Tried, Set[Goal]]]:
     """Return all motions worth keeping, run as they will be saved, with what they show."""
     points = [(motion, point, None) for point, motion in search.points]
     every = [*((motion, None, goal) for goal, motion in search.found.items()), *points]
@@ -366,7 +368,7 @@ def _candidates(stand: Stand, search: Search) -> list[tuple[Tried, Set[Goal]]]:
     return found
 
 
-def _tried(stand: Stand, motion: Motion, striker: bool, point: TurningPoint | None = None) -> Tried:
+def _tried(stand: Stand, motion: Drive, striker: bool, point: TurningPoint | None = None) -> Tried:
     trace, ended = stand.run(motion, striker)
     return Tried(motion, trace, ended, firings_of(trace), point)
 
@@ -386,7 +388,7 @@ def _fewest(found: Sequence[tuple[Tried, Set[Goal]]]) -> list[Tried]:
     return [tried for tried, _ in chosen]
 
 
-def _run(stand: Stand, tried: Tried, search: Search) -> GeneratedRun:
+def _run(stand: Stand, tried: Tried, search: MotionSearch) -> GeneratedRun:
     motion = tried.motion
     system, initial = stand.system(motion, search.strikes), stand.initial(motion)
     return GeneratedRun(tried.title, system, initial, motion.t, motion.t_end, tried.trace)

@@ -18,13 +18,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gms_fsm.charts.nesting import AGE
-from gms_fsm.generation.stand import Leg, Motion, Stand
+from gms_fsm.generation.stand import Drive, Leg, Stand
 from gms_fsm.language import names_in, truths, values_of
 from gms_fsm.traces.coverage.counting import of_view
 from gms_fsm.traces.coverage.decisions import decisions
 from gms_fsm.traces.scope import clause_text, guard_columns
 from gms_fsm.traces.trace import Trace
-from gms_fsm.verification.reaching.points import Guards, TurningPoint
+from gms_fsm.verification.reaching.points import GuardPoints, TurningPoint
 
 MOST_NODES = 5  # runs to go on from, for each edge
 PLANNED, RANDOM, GUIDED = 60, 60, 40  # attempts for each of them
@@ -55,7 +55,7 @@ class Goal(NamedTuple):
     side: str = ""
 
 
-class Firing(NamedTuple):
+class TakenAt(NamedTuple):
     """An edge taken by an element."""
 
     t: float
@@ -67,10 +67,10 @@ class Firing(NamedTuple):
 class Tried:
     """A motion with what it showed."""
 
-    motion: Motion
+    motion: Drive
     trace: Trace
     ended: str
-    firings: tuple[Firing, ...]
+    firings: tuple[TakenAt, ...]
     point: TurningPoint | None = None
 
     @property
@@ -87,20 +87,20 @@ class Tried:
         return f"{', '.join(taken[:MOST_TOLD])}{more}" or f"stays in {self.motion.state}"
 
 
-def firings_of(trace: Trace) -> tuple[Firing, ...]:
+def firings_of(trace: Trace) -> tuple[TakenAt, ...]:
     """Return the log of a contact."""
     log, places, chart = trace.firings, trace.places, trace.model.chart
     found = []
     rows = zip(log.t.tolist(), log.machine.tolist(), log.edge.tolist(), strict=True)
     for t, machine, edge in rows:
         each = chart.transitions[edge - places.first_edge]
-        found.append(Firing(t, machine - places.first, Taken(each.name, each.source)))
+        found.append(TakenAt(t, machine - places.first, Taken(each.name, each.source)))
     return tuple(found)
 
 
-def followed(firings: Sequence[Firing]) -> Iterator[tuple[Firing | None, Firing]]:
+def followed(firings: Sequence[TakenAt]) -> Iterator[tuple[TakenAt | None, TakenAt]]:
     """Yield each firing with that of the same element before it."""
-    before: dict[int, Firing] = {}
+    before: dict[int, TakenAt] = {}
     for each in firings:
         yield before.get(each.element), each
         before[each.element] = each
@@ -173,7 +173,7 @@ class Sizes:
     times: tuple[float, ...]
 
 
-def sizes_of(stand: Stand, guards: Guards) -> Sizes:
+def sizes_of(stand: Stand, guards: GuardPoints) -> Sizes:
     """Return what follows from the levels at which guards turn."""
     known, chart = guards.levels, stand.chart
     lengths = _positive(u for name in ("x", *chart.variables) for u in known.get(name, ()))
@@ -209,22 +209,22 @@ def _positive(values: Any) -> tuple[float, ...]:
     return tuple(sorted({float(f"{abs(u):.6g}") for u in values if 0.0 < abs(u) < math.inf}))
 
 
-class Search:
+class MotionSearch:
     """Motions found so far, and runs to go on from."""
 
-    def __init__(self, stand: Stand, guards: Guards, seed: int, never: Set[Goal]) -> None:
+    def __init__(self, stand: Stand, guards: GuardPoints, seed: int, never: Set[Goal]) -> None:
         self.stand, self.guards, self.chart = stand, guards, stand.chart
         self.dice = random.Random(seed)
         self.sizes = sizes_of(stand, guards)
         self.goals = tuple(goal for goal in goals_of(self.chart) if goal not in never)
-        self.found: dict[Goal, Motion] = {}
-        self.points: list[tuple[TurningPoint, Motion]] = []
+        self.found: dict[Goal, Drive] = {}
+        self.points: list[tuple[TurningPoint, Drive]] = []
         edges = (Taken(each.name, each.source) for each in self.chart.transitions)
-        self.nodes: dict[Taken, list[Motion]] = {each: [] for each in edges}
+        self.nodes: dict[Taken, list[Drive]] = {each: [] for each in edges}
         self.runs = 0
 
     @property
-    def idle(self) -> Motion:
+    def idle(self) -> Drive:
         """A motion of a chart in which nothing is to be found."""
         start = self.stand.start(self.guards, self.chart.default_state.name, {})
         return start.then(Leg(1.0, start.level, start.level))
@@ -264,7 +264,7 @@ class Search:
         return SHORT * self.sizes.times[-1]
 
     # ------------------------------------------------------------------ one run
-    def tried(self, motion: Motion) -> Tried:
+    def tried(self, motion: Drive) -> Tried:
         """Run a motion, and keep what it shows first."""
         trace, ended = self.stand.run(motion, engine=FAST if self.runs > MANY else "ifelse")
         self.runs += 1
@@ -288,7 +288,7 @@ class Search:
         """Try to reach an edge, alone or after another one, from all runs by turns."""
         *first, last = goal.edges
         starts = list(self.nodes[first[0]]) if first else self._starts(last)
-        best: tuple[tuple[float, float], Motion, int] | None = None
+        best: tuple[tuple[float, float], Drive, int] | None = None
         for start, motion in _by_turns({i: self._tries(s, last) for i, s in enumerate(starts)}):
             tried = self.tried(motion)
             if goal in self.found:
@@ -306,14 +306,14 @@ class Search:
             if close is not None and close < best[0]:
                 best = close, motion, best[2]
 
-    def _tries(self, start: Motion, last: Taken) -> Iterator[Motion]:
+    def _tries(self, start: Drive, last: Taken) -> Iterator[Drive]:
         """Yield what is tried from a start: what aims at the edge, plans, and chance, mixed."""
         planned = [*self._aimed(start, last), *itertools.islice(self._attempts(start), PLANNED)]
         self.dice.shuffle(planned)
         for pair in itertools.zip_longest(planned, self._random(start)):
             yield from filter(None, pair)
 
-    def _starts(self, last: Taken) -> list[Motion]:
+    def _starts(self, last: Taken) -> list[Drive]:
         """Return runs that are in the source of an edge."""
         into = [e for e in self.chart.transitions if e.target == last.source]
         found = [self.nodes[Taken(e.name, e.source)] for e in into]
@@ -327,7 +327,7 @@ class Search:
             return None
         return min((float(u.count("0")), sum(margins)) for u, margins in found.closest.items())
 
-    def _changed(self, motion: Motion, kept: int) -> Motion:
+    def _changed(self, motion: Drive, kept: int) -> Drive:
         """Return a motion whose later legs are changed a little."""
         legs, level = list(motion.legs[:kept]), motion.legs[kept - 1].last
         for leg in motion.legs[kept:]:
@@ -345,13 +345,13 @@ class Search:
         return min(max(u * self.dice.choice((1.0, 1.0, 0.7, 1.4)), levels[0]), levels[-1])
 
     # ------------------------------------------------------------------ what is tried
-    def _attempts(self, start: Motion) -> Iterator[Motion]:
+    def _attempts(self, start: Drive) -> Iterator[Drive]:
         """Yield motions that go on at one level, the largest first."""
         for level in self._levels(start.level):
             for hold in self._holds(level):
                 yield from self._ways(start, level, hold)
 
-    def _aimed(self, start: Motion, last: Taken) -> Iterator[Motion]:
+    def _aimed(self, start: Drive, last: Taken) -> Iterator[Drive]:
         """Yield motions that go to where a guard turns; a free body is struck to its velocity."""
         drives = self.stand.drives
         strikes = self.stand.free and len(drives) == 1 and start.strike is None
@@ -388,7 +388,7 @@ class Search:
         usual = self.sizes.times[-1]
         return min(3.0 * self.sizes.lengths[-1] / speed, LONG * usual), usual
 
-    def _ways(self, start: Motion, level: dict[str, float], hold: float) -> Iterator[Motion]:
+    def _ways(self, start: Drive, level: dict[str, float], hold: float) -> Iterator[Drive]:
         before = start.level
         if self.stand.free:
             yield start.then(Leg(hold, level, level))
@@ -400,7 +400,7 @@ class Search:
         else:
             yield start.then(Leg(0.01 * hold, before, level), Leg(hold, level, level))
 
-    def _random(self, start: Motion) -> Iterator[Motion]:
+    def _random(self, start: Drive) -> Iterator[Drive]:
         """Yield motions of one or two random legs."""
         dice = self.dice
         for _ in range(RANDOM):
@@ -426,7 +426,7 @@ class Search:
             yield start.then(*legs, strike=strike)
 
 
-def _by_turns(several: Mapping[int, Iterator[Motion]]) -> Iterator[tuple[int, Motion]]:
+def _by_turns(several: Mapping[int, Iterator[Drive]]) -> Iterator[tuple[int, Drive]]:
     """Yield from several iterators by turns, with the number of each."""
     left = dict(several)
     while left:

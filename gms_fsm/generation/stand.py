@@ -19,7 +19,7 @@ from gms_fsm.systems.parts import Body, Contact
 from gms_fsm.systems.system import System
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace
-from gms_fsm.verification.reaching.points import Guards
+from gms_fsm.verification.reaching.points import GuardPoints
 
 CONTACT, STRIKER = "contact", "striker"
 MASS = 1.0  # kg
@@ -57,7 +57,7 @@ class Leg:
 
 
 @dataclass(frozen=True)
-class Motion:
+class Drive:
     """How a run begins, and what moves it.
 
     Parameters
@@ -93,7 +93,7 @@ class Motion:
         """The signals at its end."""
         return self.legs[-1].last if self.legs else {}
 
-    def cut(self, t: float) -> Motion:
+    def cut(self, t: float) -> Drive:
         """Return the motion up to a time."""
         legs, start = list[Leg](), self.t
         for leg in self.legs:
@@ -113,11 +113,11 @@ class Motion:
         strike = self.strike if self.strike is not None and self.strike[0] <= t else None
         return replace(self, legs=tuple(legs), strike=strike)
 
-    def longer(self, share: float) -> Motion:
+    def longer(self, share: float) -> Drive:
         """Return the motion with its last levels held for a share of its duration."""
         return self.then(Leg(share * (self.t_end - self.t), self.level, self.level))
 
-    def then(self, *legs: Leg, strike: tuple[float, float] | None = None) -> Motion:
+    def then(self, *legs: Leg, strike: tuple[float, float] | None = None) -> Drive:
         """Return the motion with more legs."""
         return replace(self, legs=(*self.legs, *legs), strike=strike or self.strike)
 
@@ -168,7 +168,7 @@ class Stand:
                 found[name] = 1.0
         return found
 
-    def start(self, guards: Guards, state: str, values: Mapping[str, float]) -> Motion:
+    def start(self, guards: GuardPoints, state: str, values: Mapping[str, float]) -> Drive:
         """Return the motion of no length that begins at a point of guards."""
         level = self.at_rest()
         for name, load in zip(self.chart.velocities, guards.loads, strict=False):
@@ -180,10 +180,10 @@ class Stand:
         own = [*self.chart.variables, "x", *(self.chart.velocities if self.free else ())]
         kept = {n: values[n] for n in own if n in values and n not in self.chart.hidden}
         legs = (Leg(0.0, level, level),)
-        return Motion(state, kept, values.get("t", 0.0), legs)
+        return Drive(state, kept, values.get("t", 0.0), legs)
 
     # ------------------------------------------------------------------ running
-    def system(self, motion: Motion, striker: bool = False) -> System:
+    def system(self, motion: Drive, striker: bool = False) -> System:
         """Return the system that a motion moves, with a striker if some motion needs one."""
         chart, signals = self.chart, dict[str, Any]()  # corners by name
         t = motion.t
@@ -218,7 +218,7 @@ class Stand:
             contacts.append(Contact(STRIKER, STRIKE, hit, v=chart.velocities[0]))
         return System(chart.name, bodies=bodies, contacts=tuple(contacts), signals=signals)
 
-    def initial(self, motion: Motion) -> dict[str, Any]:
+    def initial(self, motion: Drive) -> dict[str, Any]:
         """Return the initial values of a motion."""
         n, chart = self.contact.n, self.chart
         found: dict[str, Any] = {f"{CONTACT}.states": [motion.state] * n}
@@ -230,7 +230,7 @@ class Stand:
         return found
 
     def run(
-        self, motion: Motion, striker: bool | None = None, engine: str = "ifelse"
+        self, motion: Drive, striker: bool | None = None, engine: str = "ifelse"
     ) -> tuple[Trace, str]:
         """Run a motion; return what was seen of the contact, and how the run failed, if it did."""
         striker = motion.strike is not None if striker is None else striker

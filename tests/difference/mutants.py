@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from gms_fsm import Chart
 from gms_fsm.charts.files.tables import ChartTable
 from gms_fsm.generation.generate import Generated, GeneratedRun
-from gms_fsm.generation.search import Firing, firings_of
+from gms_fsm.generation.search import TakenAt, firings_of
 from gms_fsm.generation.stand import CONTACT
 from gms_fsm.language import (
     Binary,
@@ -122,7 +122,7 @@ def _minus(tree: Value) -> Value:
 
 
 # --------------------------------------------------------------------------- telling them apart
-def _log(run: GeneratedRun, chart: Chart) -> tuple[list[Firing], str]:
+def _log(run: GeneratedRun, chart: Chart) -> tuple[list[TakenAt], str]:
     try:
         return [*firings_of(run.again(chart))], ""
     except SimulationError as error:

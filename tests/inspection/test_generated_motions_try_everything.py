@@ -26,7 +26,7 @@ from gms_fsm.charts.registry import charts
 from gms_fsm.generation.stand import CONTACT
 from gms_fsm.language import Relation
 from gms_fsm.systems.any_model import any_contact
-from gms_fsm.verification.reaching.points import Guards, TurningPoint
+from gms_fsm.verification.reaching.points import GuardPoints, TurningPoint
 from gms_fsm.verification.reaching.unreachable import Nowhere
 
 SOME = ("backlash", "elasto-plastic", "gms-signed", "maxwell-slip", "seven-parameter", "stiction")
@@ -175,7 +175,7 @@ def test_a_value_that_flows_forbids_nothing() -> None:
 def test_a_turning_point_is_where_the_last_digit_decides(name: str) -> None:
     contact = any_contact(charts()[name])
     drives = dict.fromkeys(contact.chart.velocities, "velocity")
-    guards = Guards(contact, 1.0, {}, 0, drives)
+    guards = GuardPoints(contact, 1.0, {}, 0, drives)
     for state in contact.chart.states:
         points = list(guards.turning(state.name))
         assert points
@@ -189,7 +189,7 @@ def test_a_turning_point_is_where_the_last_digit_decides(name: str) -> None:
             assert each.equal or _near(guards, each)
 
 
-def _near(guards: Guards, point: TurningPoint) -> bool:
+def _near(guards: GuardPoints, point: TurningPoint) -> bool:
     """Return whether the truth is another one at a float beside a point, in some direction."""
     _, full = guards.pairs[point.edge.source, point.edge.name][point.number]
     here = guards.holds(full, point.values)

@@ -91,17 +91,32 @@ def cover_command(
     judged and told; the file of counts has all. --generate makes the
     scenarios: few short motions that try all that can be tried.
     """
+    if generate:
+        _refuse({"--merge": merge, "--over": over, "--set": overrides}, "makes its own runs")
+        told = _generated(scenarios, contact, seed or 0, bounds or [], output)
+    else:
+        _refuse({"--seed": seed, "--bounds": bounds}, "is for --generate", own=True)
+        told = _told(scenarios, overrides or [], over or [], merge, output, contact)
+    name, percent = told.lowest
+    if fail_under is not None and percent < fail_under:
+        say(f"the lowest is {name}: {percent:.1f} %, below {fail_under:g} %")
+        raise typer.Exit(1)
+
+
+def _told(
+    scenarios: Sequence[Path],
+    overrides: Sequence[str],
+    over: Sequence[str],
+    merge: Path | None,
+    output: Path | None,
+    contact: str,
+) -> Coverage:
+    """Run scenarios, tell what they tried, and return it."""
     from gms_fsm import Coverage
     from gms_fsm.app.sweeps import axis
     from plots.output import formats
 
-    if generate:
-        _refuse({"--merge": merge, "--over": over, "--set": overrides}, "makes its own runs")
-        found = _generated(scenarios, contact, seed or 0, bounds or [], output)
-        _judge(found, fail_under)
-        return
-    _refuse({"--seed": seed, "--bounds": bounds}, "is for --generate", own=True)
-    axes = [axis(text) for text in over or []]
+    axes = [axis(text) for text in over]
     for path in filter(None, (merge, output)):  # before anything runs
         refuse_input(path, *scenarios)
         if not path.parent.is_dir():
@@ -115,7 +130,7 @@ def cover_command(
     total: Coverage | None = None
     try:
         for path in scenarios:
-            total = _sum(total, _counted(path, overrides or [], axes), path)
+            total = _sum(total, _counted(path, overrides, axes), path)
     except KeyboardInterrupt:
         note("interrupted; nothing was written")
         raise typer.Exit(INTERRUPTED) from None
@@ -131,7 +146,7 @@ def cover_command(
         import plots
 
         put(str(plots.render(plots.statechart(part.chart, counts=part), output)))
-    _judge(told, fail_under)
+    return told
 
 
 def added(found: Coverage, path: Path) -> Coverage:
@@ -142,14 +157,6 @@ def added(found: Coverage, path: Path) -> Coverage:
         total = _sum(found, Coverage.load(path), path) if there else found
         total.save(path)
     return total
-
-
-def _judge(told: Coverage, fail_under: float | None) -> None:
-    """Exit with 1 if a share is too low."""
-    name, percent = told.lowest
-    if fail_under is not None and percent < fail_under:
-        say(f"the lowest is {name}: {percent:.1f} %, below {fail_under:g} %")
-        raise typer.Exit(1)
 
 
 def _refuse(given: Mapping[str, object], why: str, own: bool = False) -> None:

@@ -60,7 +60,7 @@ class TurningPoint:
     values: Mapping[str, float]
 
 
-class Guards:
+class GuardPoints:
     """The guards of one element of a contact, as functions of numbers."""
 
     def __init__(
