@@ -16,7 +16,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import WEIGHTS
 from gms_fsm.exporters._adapting import word_of
-from gms_fsm.exporters._quantities import CURVE, MODEL, WEIGHT, Quantity
+from gms_fsm.exporters._quantities import Quantity
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.targets.js import RunModule
 from gms_fsm.lowering.adapting import Adapting
@@ -24,6 +24,7 @@ from gms_fsm.lowering.compiling import functions
 from gms_fsm.run.problem import Problem
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import NUMBERS, numbers_of
+from gms_fsm.systems.reading.values import CURVE, MODEL, WEIGHT
 from integrators import loop
 from integrators.machine_code.compact import compact
 from integrators.machine_code.front_end.translate import Translator

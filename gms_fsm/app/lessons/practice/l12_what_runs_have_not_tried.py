@@ -25,29 +25,18 @@ v_c = 1 mm/s is the speed below which an element may arrest.
 
 ## Predict
 
-Two runs: a mass of 1 kg is pulled forward through a spring of 2 N/m at 0.1 m/s for 40 s, and sticks
-and slips; a slider is moved at 0.2 + 0.1 sin(t) m/s for 10 s.
+Two runs first: a mass of 1 kg is pulled forward through a spring of 2 N/m at 0.1 m/s for 40 s, and
+sticks and slips; a slider is moved at 0.2 + 0.1 sin(t) m/s for 10 s. A third run moves to and fro,
+v = 0.2 sin(t) m/s for 20 s. With it all three edges are taken: by the number of edges nothing is
+missing. When z reaches -s in this run, v is about -0.1 m/s.
 
-1. How many of the three edges do they take together?
-
-A third run moves to and fro, v = 0.2 sin(t) m/s for 20 s. Now all three edges are taken: by the
-number of edges nothing is missing. When z reaches -s in this run, v is about -0.1 m/s.
-
+1. How many of the three edges do the first two runs take together?
 2. In how many of the three runs does the copy switch at other times, or by other edges, than the
    original?
 3. The guard of break_away_backward has two comparisons. How many of them has the third run seen to
    decide alone?
-
-Last, the element begins in stick, bent to z = -s, and rests: v = 0.
-
-4. Which chart slips at once: the "original", the "copy", "both" or "none"?
-
-```python
-edges_taken = None  # of 3
-runs_that_differ = None  # of 3
-decided = None  # of 2
-slips_at_rest = None  # "original", "copy", "both" or "none"
-```
+4. Last, the element begins in stick, bent to z = -s, and rests: v = 0. Which chart slips at once:
+   the original, the copy, both or none?
 
 ## Measure
 
@@ -65,27 +54,13 @@ with v = {v!m:.3g} mm/s, which is -v_c. At rest, bent to z = -s, the {slips_at_r
 So: runs that look good test what they ask. An edge that was taken says that its guard was true
 once, not which comparison decided it; a motion made for a comparison asks just there.
 
-## Compare
-
-```python
-from gms_fsm.app.lessons.engine.predict import reveal, vary
-
-reveal(edges_taken, result.edges_taken)
-reveal(runs_that_differ, result.runs_that_differ)
-reveal(decided, result.decided)
-reveal(slips_at_rest, result.slips_at_rest)
-```
-
-<details>
-<summary>Why?</summary>
+## Why
 
 Forward runs bend the element forward only: z never comes near -s. On the way back z passes -s while
 v is far below -v_c, so both ``v < -v_c`` and ``v < v_c`` are true. Whether the element breaks away
 is then decided by z alone, and the second comparison might be anything: nobody has asked. At rest
 ``v < -v_c`` is false and ``v < v_c`` is true. A real element comes there when it is bent back
 to -s and stopped: the copy lets go of what the original holds.
-
-</details>
 
 ## Read what is missing
 
@@ -151,6 +126,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.app.lessons.engine.lesson import DOTS, FASTEST, GUIDE, Lesson, grid, note, ticks
+from gms_fsm.app.lessons.engine.predict import Question
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.files.tables import ChartTable
 from gms_fsm.generation.generate import GeneratedRun
@@ -310,4 +286,16 @@ def _shares(ax: Any, r: Any) -> str:
     return "coverage"
 
 
-LESSON = Lesson(__name__, run, (_plane, _shares), grid("ab", (8.2, 4.4), widths=(1.4, 1)))
+LESSON = Lesson(
+    __name__,
+    run,
+    (_plane, _shares),
+    grid("ab", (8.2, 4.4), widths=(1.4, 1)),
+    level="graduate",
+    questions=(
+        Question("edges_taken", atol=0.5),
+        Question("runs_that_differ", atol=0.5),
+        Question("decided", atol=0.5),
+        Question("slips_at_rest", choices=("original", "copy", "both", "none")),
+    ),
+)
