@@ -54,6 +54,7 @@ class LiveWhole(NamedTuple):
     buffers: Any
     log: Any
     recorded: Any
+    tally: Any
     adapting: Adapting
     table: Any  # observed values of the rows
     values: Any
@@ -97,7 +98,7 @@ class _LiveModule(RunModule):
         """Return the arguments of all entries."""
         layout, own = start.program.layout, functions(start.program)
         return LiveWhole(
-            run.functions, run.machines, run.buffers, run.log, run.recorded, adapting,
+            run.functions, run.machines, run.buffers, run.log, run.recorded, run.tally, adapting,
             OuterArray("f", layout.observed.size), own["values"], start.program.calm,
             OuterArray("f", max(layout.shown.size, 1)),
         )  # fmt: skip
