@@ -255,7 +255,7 @@ class _Common:
 
         Functions of the user's are not called for it: they might fail.
         """
-        if not self.coverage or start.output != "end" or start.program.callables:
+        if not self.coverage or self.settings.output != "end" or start.program.callables:
             return self
         found = counting_of(start.program.plan)
         large = found is not None and found.counts + found.distances > LARGE

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import functools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful
+from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful, quickened
 from gms_fsm.lowering.printing.counting import Counting, CountPlaces
 from gms_fsm.run.problem import Problem
 
@@ -77,9 +78,7 @@ class RowCounter:
     _near: list[float] = field(init=False)
 
     def __post_init__(self) -> None:
-        source = self.tables.counting.source
-        self._fast = load("counting", source, SIGNALS)["count"]
-        self._careful = ieee(_fails, load_careful("counting", source, SIGNALS)["count"])
+        self._fast, self._careful = _functions(self.tables.counting.source)
         self._counts, self._near = self.tables.counts.tolist(), self.tables.near.tolist()
 
     def __call__(self, t: float, y: list[float], mode: Sequence[int]) -> None:
@@ -96,5 +95,12 @@ class RowCounter:
         self.tables.counts[:], self.tables.near[:] = self._counts, self._near
 
 
-def _fails(*_: Any) -> None:
-    raise ArithmeticError
+@functools.lru_cache(maxsize=64)
+def _functions(source: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Return the function that counts a row, and the same where Python would raise."""
+
+    def fails(*_: Any) -> None:
+        raise ArithmeticError
+
+    fast = quickened(load("counting", source, SIGNALS))["count"]
+    return fast, ieee(fails, load_careful("counting", source, SIGNALS)["count"])
