@@ -7,10 +7,13 @@ nothing of arrays.
 from __future__ import annotations
 
 import math
+import multiprocessing
 import time
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +22,7 @@ import pytest
 from gms_fsm import (
     Chart,
     ChartModel,
+    Coverage,
     Prescribed,
     State,
     Stribeck,
@@ -250,6 +254,46 @@ def test_a_sweep_counts_as_its_runs_do(t_eval: list[float] | None) -> None:
     for name in ("t", "x", "v", "F", "z"):  # the same runs, to the last bit
         assert getattr(plain, name).tobytes() == getattr(full, name).tobytes()
     assert plain.transitions.tobytes() == full.transitions.tobytes()
+
+
+@pytest.mark.parametrize("engine", [FASTEST, "ifelse"])
+def test_a_sweep_keeps_no_rows_to_count(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(trace: Trace) -> None:
+        raise AssertionError("counted from rows")
+
+    monkeypatch.setattr("gms_fsm.run.sweep.of_trace", none)
+    given: Any = (stick_slip("signed"), Prescribed(FIG4_SINE), 30.0, SWEPT)
+    assert coverage(sweep(*given, engine=engine, coverage=True)) == coverage(_runs())
+
+
+@pytest.mark.parametrize(
+    ("chart", "velocity"), [(LONG, "0.2*sin(t)"), (GUARDED, lambda t: 0.2 * math.sin(t))]
+)
+def test_what_cannot_be_counted_as_it_comes_is_counted_from_rows(
+    chart: Chart, velocity: Any
+) -> None:
+    """Guards of many comparisons, and what reads functions of the user's."""
+    values = dict.fromkeys(chart.parameter_names, 0.05)
+    given = ChartModel(chart, values, n=2), Prescribed(velocity), 9.0
+    found = sweep(*given, {"sigma_2": [0.0, 1.0]}, engine=FASTEST, coverage=True)
+    one = coverage(simulate(*given, engine=FASTEST))
+    assert found.outcome.tolist() == ["ok"] * 2
+    assert coverage(found) == one + one
+
+
+@pytest.mark.slow
+def test_workers_and_files_count_as_one(tmp_path: Path) -> None:
+    given: Any = (stick_slip("signed"), Prescribed(FIG4_SINE), 30.0)
+    numbers = np.linspace(1.3, 1.7, 200)  # several tasks
+    whole = coverage(sweep(*given, {"F_s": numbers}, engine=FASTEST, coverage=True))
+    parts = []
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+        for k in range(3):
+            some = {"F_s": numbers[k::3]}
+            swept = sweep(*given, some, executor=pool, engine=FASTEST, coverage=True)
+            parts.append(coverage(swept).save(tmp_path / f"{k}.json"))
+    assert Coverage.merged(Coverage.load(part) for part in reversed(parts)) == whole
+    assert whole.contact().watched == whole.runs == 200
 
 
 def test_a_sweep_of_a_system_counts_each_contact() -> None:
