@@ -40,7 +40,7 @@ class StateCoverage:
     name : str
         The state.
     rows : tuple of int
-        Rows in it, for each element; 0 of runs without rows.
+        Rows in it, for each element; 0 of runs whose rows were not counted.
     entries : tuple of int
         How often each element entered it; a run that begins in it has entered it.
     """
@@ -112,7 +112,7 @@ class ChartCoverage:
     runs : int
         Number of runs.
     watched : int
-        Number of runs that kept rows. Of the others only states and edges are known.
+        Number of runs whose rows were counted. Of the others only states and edges are known.
     """
 
     chart: Chart
@@ -185,7 +185,7 @@ class ChartCoverage:
 
         A clause is one comparison of a guard in one source, and counts once for true and once for
         false. For MC/DC it must have decided the guard alone, once true and once false. The last
-        two are left out if no run kept rows.
+        two are left out if the rows of no run were counted.
         """
         states = [any(each.seen) for each in self.states]
         edges = [any(each.taken) for each in self.edges]
