@@ -258,7 +258,7 @@ class _Common:
         if not self.coverage or self.settings.output != "end" or start.program.callables:
             return self
         found = counting_of(start.program.plan)
-        large = found is not None and found.counts + found.distances > LARGE
+        large = found is not None and found.size > LARGE
         return self if large and start.chosen.engine != "compiled" else replace(self, counted=found)
 
     def start(self, what: Mounted) -> Problem:

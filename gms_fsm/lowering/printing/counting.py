@@ -6,8 +6,8 @@ It stands apart from the program: a run that does not count does not know it.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.foundation.equality import ByIdentity
@@ -52,6 +52,16 @@ class AskedTogether:
     def size(self) -> int:
         """Number of counts of an element."""
         return int(2 ** len(self.comparisons))
+
+    @property
+    def of_element(self) -> slice:
+        """The places of its counts among those of an element."""
+        return slice(self.first, self.first + self.size)
+
+    @property
+    def apart(self) -> slice:
+        """The places of its distances among those of the chart."""
+        return slice(self.nearest, self.nearest + self.size * len(self.comparisons))
 
 
 @dataclass(frozen=True)
@@ -130,6 +140,19 @@ class Counting:
         """Number of all distances."""
         return sum(own.distances for own in self.places)
 
+    @property
+    def size(self) -> int:
+        """Number of all places."""
+        return self.counts + self.distances
+
+    def parts(self) -> Iterator[tuple[CountPlaces, int, slice, slice]]:
+        """Yield for each contact its places, its elements, its counts and its distances in all."""
+        first = nearest = 0
+        for own, n in zip(self.places, self.sizes, strict=True):
+            end, last = first + n * own.counts, nearest + own.distances
+            yield own, n, slice(first, end), slice(nearest, last)
+            first, nearest = end, last
+
 
 def counting_of(plan: ProgramPlan) -> Counting | None:
     """Return how the rows of a program are counted; None if it would take too much room."""
@@ -142,28 +165,27 @@ def _counting(plan: ByIdentity[ProgramPlan]) -> Counting | None:
     places = [own for bank in banks if (own := CountPlaces.of(bank.chart)) is not None]
     if len(places) < len(banks):
         return None
-    made = Counting(_CountPrinter(plan.it).text(places), (*places,), tuple(u.n for u in banks))
-    return made if made.counts + made.distances <= MOST else None
+    made = Counting("", (*places,), tuple(bank.n for bank in banks))
+    if made.size > MOST:
+        return None
+    return replace(made, source=_CountPrinter(plan.it).text(made))
 
 
 class _CountPrinter(LockFunctions):
     """Prints the function."""
 
-    def text(self, places: Sequence[CountPlaces]) -> str:
+    def text(self, counting: Counting) -> str:
         """Return the function with the numbers of the states."""
         banks = self.read.banks
         lines = self.before_guards(
             computed_names(edge.guard) for bank in banks for edge in bank.edges
         )
-        first = nearest = 0
-        for bank, own in zip(banks, places, strict=True):
+        for bank, (own, _, counts, apart) in zip(banks, counting.parts(), strict=True):
             branches: dict[str, list[CodeLine]] = {state: [] for state in bank.states}
             for group in own.groups:
-                place = str(first + group.first), f"{own.counts} * i"
-                branches[bank.states[group.state]] += self.counted(bank, group, place, nearest)
+                first = str(counts.start + group.first), f"{own.counts} * i"
+                branches[bank.states[group.state]] += self.counted(bank, group, first, apart.start)
             lines += self.loop(bank.index, "live", (), branches)
-            first += own.counts * bank.n
-            nearest += own.distances
         head = [f"# {visible(self.plan.title)}: counts what guards see"]
         head += [numbered(states.values()) for states in self.names.states]
         code = self.function(

@@ -53,11 +53,8 @@ class CountTables:
 
     def parts(self) -> Iterator[tuple[CountPlaces, NDArray[np.int64], NDArray[np.float64]]]:
         """Yield for each contact its places, counts, one row for each element, and distances."""
-        first = nearest = 0
-        for own, n in zip(self.counting.places, self.counting.sizes, strict=True):
-            counts = self.counts[first : first + n * own.counts].reshape(n, own.counts)
-            yield own, counts, self.near[nearest : nearest + own.distances]
-            first, nearest = first + n * own.counts, nearest + own.distances
+        for own, n, counts, apart in self.counting.parts():
+            yield own, self.counts[counts].reshape(n, -1), self.near[apart]
 
 
 @dataclass(eq=False)

@@ -151,10 +151,10 @@ def of_tables(
     asked: list[Asked] = [({}, {})] * len(chart.transitions)
     guards = decisions(chart)
     for group in places.groups:
-        table = counts[:, group.first : group.first + group.size]
+        table = counts[:, group.of_element]
         rows[group.state] = table.sum(axis=1)
         seen, many = np.flatnonzero(table.any(axis=0)), len(group.comparisons)
-        distances = near[group.nearest :][: group.size * many].reshape(group.size, many)[seen]
+        distances = near[group.apart].reshape(group.size, many)[seen]
         for edge in group.edges:
             parts = guards[chart.transitions[edge].name].comparisons
             bits = [group.comparisons.index(part) for part in parts]
