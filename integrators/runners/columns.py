@@ -34,7 +34,7 @@ class Recorded(NamedTuple):
     seen: list[list[int]]  # three places among what is observed; the third is read after, too
 
 
-class RowCounts(NamedTuple):
+class RowTally(NamedTuple):
     """Counts of rows, in place of the rows themselves; without places nothing is counted."""
 
     count: Callable[..., Any]  # count(t, y, mode, p, counts, near)
@@ -73,7 +73,7 @@ def record(
     b: Buffers,
     log: LogColumns,
     recorded: Recorded,
-    tally: RowCounts,
+    tally: RowTally,
     most_steps: int,
     pause: bool,
 ) -> int:
@@ -124,7 +124,7 @@ def record(
             return DONE
 
 
-def _count(out: Output, memory: Memory, mode: list[int], tally: RowCounts, p: Any) -> None:
+def _count(out: Output, memory: Memory, mode: list[int], tally: RowTally, p: Any) -> None:
     """Count the rows since the last event, all in the same modes, and forget them."""
     for row in range(out.row):
         tally.count(out.rows_t[row], out.rows_y[row], mode, p, tally.counts, tally.near)

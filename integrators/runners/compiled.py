@@ -41,7 +41,7 @@ from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.tree import Local
 from integrators.runners import columns, observing, repeating, stepping
-from integrators.runners.columns import LogColumns, Recorded, RowCounts, counts_nothing
+from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
 from integrators.runners.stepping import Sample
 from integrators.sliding import Functions, Held, Sliding
 from integrators.steps import Coefficients
@@ -98,7 +98,7 @@ class RecordArguments(NamedTuple):
     buffers: Buffers
     log: LogColumns
     recorded: Recorded
-    tally: RowCounts
+    tally: RowTally
     more: Any = ()  # what further entries need
 
 
@@ -520,9 +520,9 @@ def example(functions: Functions, machines: Machines, b: Buffers, observed: int,
     p: Any = functions.p
     shared, own, _ = p
     functions = functions._replace(p=(shared, own, OuterArray(table=True)))
-    tally = RowCounts(counts_nothing, [], [])
+    tally = RowTally(counts_nothing, [], [])
     if count is not None:
-        tally = RowCounts(count, column("i"), column())
+        tally = RowTally(count, column("i"), column())
     return RecordArguments(
         functions, machines, b._replace(plan=plan, out=out), log, recorded, tally
     )

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from integrators.loop import ROWS, Buffers, Machines
-from integrators.runners.columns import LogColumns, Recorded, RowCounts, put_modes, record
+from integrators.runners.columns import LogColumns, Recorded, RowTally, put_modes, record
 from integrators.runners.observing import observe_row
 from integrators.sliding import Functions, Held
 from integrators.steps import Vector
@@ -37,7 +37,7 @@ def repeat(
     b: Buffers,
     log: LogColumns,
     recorded: Recorded,
-    tally: RowCounts,
+    tally: RowTally,
     more: Any,
     repeats: Repeats,
     start: int,

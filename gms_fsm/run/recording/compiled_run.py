@@ -30,7 +30,7 @@ from integrators import hybrid, loop
 from integrators.loop import Memory
 from integrators.machine_code.records import arrays_of, put_numbers
 from integrators.runners import states
-from integrators.runners.columns import LogColumns, Recorded, RowCounts
+from integrators.runners.columns import LogColumns, Recorded, RowTally
 from integrators.sliding import Functions, Sliding
 from integrators.steps import Now
 
@@ -227,7 +227,7 @@ class Columns:
             )
         )
 
-    def _tally(self) -> RowCounts:
+    def _tally(self) -> RowTally:
         """Return the tables of counts, if there are any."""
         tally = self.run_of.tally
         if self.tables is None:
