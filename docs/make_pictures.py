@@ -204,6 +204,7 @@ def microstep_figure(trace: Trace) -> Figure:
             fontsize=8,
         )
         by_step.set(xlabel="micro-step", ylabel="$F$ [N]", xticks=range(5), xlim=(-0.5, 5.3))
+        by_step.tick_params(labelleft=True)
         by_step.set_ylim(top=1.08 * trace.F[rows].max())  # room for the names
     return figure
 

@@ -14,6 +14,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from xml.etree import ElementTree
 
 import numpy as np
@@ -359,7 +360,22 @@ def live_statechart(
     chart = LiveChart(
         trace, elements, notation=notation, theme=theme, values=values, direction=direction
     )
-    return chart.frame(row if row is not None else chart.at(t if t is not None else math.nan))
+    chart.frame(row if row is not None else chart.at(t if t is not None else math.nan))
+    _close_gaps(chart.root)
+    return Svg(ElementTree.tostring(chart.root, encoding="unicode"))
+
+
+def _close_gaps(root: ElementTree.Element) -> None:
+    """Take the room of marks that are not shown: a picture that stays as it is needs none."""
+    for group in root.iter("g"):
+        texts = [each for each in group.findall("text") if each.get("x")]
+        for line in {each.get("y") for each in texts}:
+            shift, after = 0.0, [each for each in texts if each.get("y") == line]
+            for text, following in zip_longest(after, after[1:]):
+                x = float(text.get("x", 0.0))
+                if text.get("visibility") == "hidden" and following is not None:
+                    shift += float(following.get("x", 0.0)) - x
+                text.set("x", f"{x - shift:g}" if shift else text.get("x", ""))
 
 
 # --------------------------------------------------------------------------- reading the run

@@ -188,16 +188,16 @@ def ribbons_figure(
     within: float = CASCADE,
     title: str = "",
 ) -> Figure:
-    """Draw what happens in a run, why, and in which order: ribbons, a cascade, portraits.
+    """Draw what happens in a run, why, and in which order: ribbons, and a cascade or portraits.
 
     Parameters
     ----------
     trace : Trace
         The run.
     around : float, optional
-        The break-away that the middle column shows, s; see `plots.panels.cascade_window`.
+        The break-away that the right column shows, s; see `plots.panels.cascade_window`.
     window : (float, float), optional
-        Of the left and right columns, s. By default the whole run; if it has too many states to
+        Of the left column, s. By default the whole run; if it has too many states to
         read, its last three cycles.
     elements : sequence of int, optional
         Which elements, counted from 0; by default all.
@@ -209,9 +209,9 @@ def ribbons_figure(
     Returns
     -------
     Figure
-        Left: v, z / s, F and states over time. Middle: the zoom (omitted if nothing ever breaks
-        away and `around` is not given). Right: F against v and x. On a slide there is room for four
-        panels: v and z / s are left out, and with a zoom also what is on the right.
+        Left: v, z / s, F and states over time. Right: the zoom, or if nothing ever breaks away and
+        `around` is not given F against v and x. On a slide there is room for four panels: v and
+        z / s are left out.
     """
     limits = checked_window(trace, window)
     if window is None and len(trace.transitions) > MOST_SPANS * trace.n:
@@ -252,7 +252,7 @@ def ribbons_figure(
 def _ribbon_axes(
     tall: Sequence[float], *, zoom: bool
 ) -> tuple[Figure, list[Axes], list[Axes], list[Axes]]:
-    """Return an empty figure and its panels: over time, of the zoom, and F against v and x.
+    """Return an empty figure and its panels: over time, and of the zoom or F against v and x.
 
     On a slide there is room for four panels.
     """
@@ -260,26 +260,21 @@ def _ribbon_axes(
     heights = list(tall[-rows:])
     if narrow():
         column = [0.75 * each for each in heights] * (2 if zoom else 1)
-        figure = sheet(4.2, sum(column) + 2.1 + 0.3 * len(column))
-        halves = figure.add_gridspec(2, 1, height_ratios=(len(column), 1.8))
+        figure = sheet(4.2, sum(column) + (0.0 if zoom else 2.1) + 0.3 * len(column))
+        parts = 1 if zoom else 2
+        halves = figure.add_gridspec(parts, 1, height_ratios=(len(column), 1.8)[:parts])
         axes = list(
             figure.add_subfigure(halves[0, 0]).subplots(len(column), 1, height_ratios=column)
         )
-        pair = list(figure.add_subfigure(halves[1, 0]).subplots(1, 2))
+        pair = [] if zoom else list(figure.add_subfigure(halves[1, 0]).subplots(1, 2))
         return figure, axes[:rows], axes[rows:], pair
-    figure = sheet(11.6 if zoom else 9.6, sum(tall) + 2.2)
-    beside = not (zoom and low())
-    widths = (2.1 if zoom else 1.3, 1)[: 1 + beside]
-    halves = figure.add_gridspec(1, len(widths), width_ratios=widths)
-    grid = figure.add_subfigure(halves[0, 0]).subplots(
-        rows,
-        2 if zoom else 1,
-        squeeze=False,
-        width_ratios=(1.45, 1) if zoom else None,
-        height_ratios=heights,
-    )
-    right = list(figure.add_subfigure(halves[0, 1]).subplots(2, 1)) if beside else []
-    return figure, list(grid[:, 0]), list(grid[:, 1]) if zoom else [], right
+    figure = sheet(9.6, sum(tall) + 2.2)
+    if zoom:
+        grid = figure.subplots(rows, 2, width_ratios=(1.45, 1), height_ratios=heights)
+        return figure, list(grid[:, 0]), list(grid[:, 1]), []
+    halves = figure.add_gridspec(1, 2, width_ratios=(1.3, 1))
+    axes = list(figure.add_subfigure(halves[0, 0]).subplots(rows, 1, height_ratios=heights))
+    return figure, axes, [], list(figure.add_subfigure(halves[0, 1]).subplots(2, 1))
 
 
 def cascade_figure(

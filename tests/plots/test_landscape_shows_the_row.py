@@ -26,6 +26,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.quiver import Quiver
 from matplotlib.text import Annotation
 
 from plots import figures, panels
@@ -95,7 +96,7 @@ def test_dot_path_ranges_and_arrows_are_those_of_the_row(run: Trace) -> None:
     points = path.get_xydata()  # type: ignore[attr-defined]
     assert points[~np.isnan(points[:, 0])][-1] == pytest.approx(here)
     # While sticking dz/dt = v: arrows point up for v > 0, down for v < 0; all with dv/dt.
-    (flow,) = (each for each in drawn if type(each).__name__ == "Quiver")
+    (flow,) = (each for each in drawn if isinstance(each, Quiver))
     assert (np.sign(flow.V) == np.sign(flow.X)).all()  # type: ignore[attr-defined]
     slope = (run.v[row + 1] - run.v[row - 1]) / (run.t[row + 1] - run.t[row - 1])
     assert (np.sign(flow.U) == np.sign(slope)).all()  # type: ignore[attr-defined]

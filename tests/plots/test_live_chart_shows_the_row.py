@@ -12,6 +12,7 @@ import re
 import shutil
 import sys
 from functools import cache
+from itertools import pairwise
 from typing import Any
 from xml.etree import ElementTree
 
@@ -225,7 +226,7 @@ def test_at_is_the_last_row_at_or_before_a_time() -> None:
         assert found >= row
         assert trace.t[found] == trace.t[row]
         assert chart.at(min(float(trace.t[row]) + 1e-9, float(trace.t[-1]))) >= found
-    assert live_statechart(trace, t=20.0) == chart.frame(chart.at(20.0))
+    assert live_statechart(trace, t=20.0) == live_statechart(trace, row=chart.at(20.0))
     assert LiveChart(trace.sample([30.0, 10.0, 20.0])).at(25.0) == 2
 
 
@@ -263,3 +264,15 @@ def test_a_guard_that_cannot_be_computed_is_marked() -> None:
     trace.__dict__["seen"] = {**trace.seen, "friction.v": 0.0 * trace.v}  # a cached property
     assert shown.look(0)[0].marks == {"ab": (False, None)}
     assert marks(groups(shown.frame(0))["element1-guard-ab"]) == ["✗", "?"]
+
+
+def test_a_still_picture_keeps_no_room_for_marks_that_are_not_shown() -> None:
+    trace = run("bank")
+    texts = groups(live_statechart(trace, t=20.0, elements=[0]))["element1-guard-arrest"]
+    for line in {each.get("y") for each in texts.findall("text")}:
+        every = [each for each in texts.findall("text") if each.get("y") == line]
+        shown = [each for each in every if each.get("visibility") != "hidden"]
+        for one, other in pairwise(shown):
+            wide = 6.0 * len(one.text or "")  # a cell of the monospaced font at 10 points
+            apart = float(other.get("x", 0)) - float(one.get("x", 0))
+            assert apart == pytest.approx(wide, abs=1.0)

@@ -41,7 +41,7 @@ from plots.style import (
     VERMILION,
     element_colour,
 )
-from plots.style.matplotlib import Axes, NullLocator, to_rgb
+from plots.style.matplotlib import Axes, NullLocator, Quiver, RendererBase, to_rgb
 from plots.style.presets import font, pt
 from plots.views.plane import Plane, linear_threshold, turning_points
 from plots.views.window import Window
@@ -386,21 +386,26 @@ def _flow(ax: Axes, trace: Trace, plane: Plane, view: PlaneWindow, names: LineNa
     tails = np.stack([np.broadcast_to(each, rate.shape) for each in (v, view.factor * z)], axis=-1)
     arrows = np.stack([v_ahead - v, view.factor * higher], axis=-1)
     names.curves += [*np.stack([tails, tails + arrows], axis=-2).reshape(-1, 2, 2)]
-    return [
-        ax.quiver(
-            tails[..., 0],
-            tails[..., 1],
-            arrows[..., 0],
-            arrows[..., 1],
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            color=PALE_GREY,
-            width=0.0022,
-            headwidth=4.5,
-            zorder=2,
-        )
-    ]
+    drawn = _FlowArrows(ax, names, tails, arrows)
+    ax.add_collection(drawn, autolim=False)
+    return [drawn]
+
+
+class _FlowArrows(Quiver):
+    """Arrows at their tails, without those that a name would cover."""
+
+    def __init__(self, ax: Axes, names: LineNames, tails: Floats, arrows: Floats) -> None:
+        look: Any = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "color": PALE_GREY}
+        look |= {"width": 0.0022, "headwidth": 4.5, "zorder": 2}
+        places = (tails[..., 0], tails[..., 1], arrows[..., 0], arrows[..., 1])
+        super().__init__(ax, *places, **look)
+        self.names, self.tails, self.arrows = names, tails, arrows
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw the arrows that are free."""
+        hidden = self.names.covered(renderer, self.tails, self.tails + self.arrows)
+        self.set_UVC(*(np.ma.masked_array(self.arrows[..., k], hidden) for k in (0, 1)))
+        super().draw(renderer)
 
 
 # --------------------------------------------------------------------------- counterexamples

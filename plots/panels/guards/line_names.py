@@ -118,6 +118,18 @@ class LineNames(Artist):
         assert isinstance(self.axes, Axes)
         return self.axes
 
+    def covered(self, renderer: RendererBase, tails: Floats, heads: Floats) -> NDArray[np.bool_]:
+        """Return which arrows a name would cover, by their ends in data coordinates."""
+        pad = PAD * float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
+        ends = [self._owner.transData.transform(each.reshape(-1, 2)) for each in (tails, heads)]
+        found = np.zeros(len(ends[0]), dtype=bool)
+        for text in self.placed(renderer):
+            box = text.get_window_extent(renderer).padded(pad)
+            for part in np.linspace(0.0, 1.0, 5):
+                point = ends[0] + part * (ends[1] - ends[0])
+                found |= ((point > box.min) & (point < box.max)).all(axis=1)
+        return found.reshape(tails.shape[:-1])
+
     def _text(self, line: NamedLine) -> Text:
         box = {"boxstyle": f"square,pad={PAD / 10}", "facecolor": PAPER, "edgecolor": "none"}
         text = Text(
