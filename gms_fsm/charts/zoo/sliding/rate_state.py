@@ -46,7 +46,8 @@ from gms_fsm.charts.registry import Demonstration, Entry
 
 # dpsi/dt = dtheta/dt / theta. The logarithm of a square does not depend on the sign that abs(v)
 # keeps until the crossing of v = 0 is located; `tiny` keeps it finite at v = 0.
-TINY = {"tiny": "1e-300"}
+THETA = {"theta": "D_c / V_0 * exp(psi)"}
+LETS = {"ageing": THETA, "slip": THETA | {"tiny": "1e-300"}}
 FLOWS = {
     "ageing": "1 / theta - abs(v) / D_c",
     "slip": "-abs(v) / D_c * 0.5 * log((v * theta / D_c)**2 + tiny)",
@@ -71,7 +72,7 @@ def _rate_state(law: str) -> Chart:
         transitions=(),
         outputs={"F": "a * N * asinh(v / (2 * V_0) * exp((mu_0 + b * psi) / a))"},
         reference=REFERENCES[law],
-        let={"theta": "D_c / V_0 * exp(psi)"} | (TINY if law == "slip" else {}),
+        let=LETS[law],
     )
 
 
