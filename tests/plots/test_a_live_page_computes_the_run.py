@@ -135,6 +135,20 @@ def test_sliders_have_the_numbers_units_and_rules(live: Any) -> None:
     assert "is not a number, or not in N" in page.inner_text("#refused")
 
 
+def test_sliders_are_moved_by_keys_which_do_not_walk_the_run(live: Any) -> None:
+    page = live("pulled_mass")
+    page.evaluate("go(10)")
+    page.locator("[data-name=F_s] input[type=range]").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("dials.get('F_s').value") > 1.5
+    assert page.evaluate("frame") == 10
+    page.keyboard.press("End")
+    text = page.locator("[data-name=F_s] input[type=range]").get_attribute("aria-valuetext")
+    assert text == "4.700 N"
+    assert page.evaluate("dials.get('v_c').box.value") == "1e-6"
+
+
 def test_the_base_run_stays_behind_and_the_first_difference_is_named(live: Any) -> None:
     page = live("servo")
     before = page.evaluate("[runs[1].rows, runs[1].t(runs[1].rows - 1)]")

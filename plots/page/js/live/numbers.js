@@ -16,6 +16,9 @@ function typed(text, unit) {
   return known && known[1] === unit ? u * known[0] : NaN;
 }
 
+// A number exactly, in few letters.
+const exactly = (u) => (u !== 0 && (Math.abs(u) < 1e-3 || Math.abs(u) >= 1e6) ? u.toExponential().replace("e+", "e") : String(u));
+
 class Dial {
   constructor(box, given, changed) {
     Object.assign(this, given, { given, changed, value: given.value });
@@ -55,8 +58,8 @@ class Dial {
     const { value: u, low, high, log, unit } = this, part = log ? Math.log(u / low) / Math.log(high / low) : (u - low) / (high - low);
     this.range.value = Math.round(SLIDER_STEPS * clamp(Number.isNaN(part) ? 0 : part, 0, 1));
     this.range.setAttribute("aria-valuetext", eng(u, unit === "1" ? "" : unit, 4));
-    if (document.activeElement !== this.box || this.box.getAttribute("aria-invalid") !== "true") this.box.value = String(u);
-    for (const box of this.linked ?? []) box.value = String(u);
+    if (document.activeElement !== this.box || this.box.getAttribute("aria-invalid") !== "true") this.box.value = Number.isNaN(u) ? "" : exactly(u);
+    for (const box of this.linked ?? []) box.value = exactly(u);
     this.root.classList.toggle("changed", u !== this.given.value);
   }
 }
