@@ -312,3 +312,13 @@ def test_thresholds_masses_and_numbers_of_guards_are_changed_in_the_picture(live
     assert page.evaluate("dials.get('v_c').value") == 2e-6
     wait(page, "!frameAsked && !live.busy")
     assert page.evaluate("runs[0].contacts[0].parameters.v_c") == 2e-6
+
+
+def test_a_sweep_of_another_contact_has_its_quantities(live: Any) -> None:
+    page = live("ball_screw_table", tab="Sweep")
+    page.locator("select.contact").select_option("guide")
+    pane = "views[0].open.right"
+    wait(page, f"{pane}.found.filter(Boolean).length > 3")
+    place = page.evaluate(f"{pane}.view.run.recipes[views[0].contact.values.v.all]")
+    assert place[0] in ("y", "seen")
+    assert page.evaluate(f"JSON.parse({pane}.asked)[2]") == "guide"

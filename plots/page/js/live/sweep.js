@@ -65,7 +65,14 @@ class SweepPane {
 
   close() { this.worker?.terminate(); }
 
-  choose(other) { if (other) { this.close(); this.worker = null; this.box.replaceChildren(); Object.assign(this, new SweepPane(this.view, this.box)); this.fit(); } }
+  choose(other) {
+    if (!other) return;
+    const { shown, velocity } = this.view.contact;
+    this.of.replaceChildren();
+    for (const name of shown) make("option", this.of, name);
+    if (velocity) this.of.value = velocity;
+    this.fit();
+  }
 
   renew() { this.ask(); return true; }
 
