@@ -37,7 +37,7 @@ def main() -> None:
         "next",
         light=True,
     )
-    steps = "element pad 1", "goto 20", "goto 5.2", "next"
+    steps = "element pad 1", "goto 0.01", "goto 0.0026", "next"
     screen("debugger_brake", "brake_squeal", (124, 42), *steps)
     live("live", "pulled_mass", 0.29)
 

@@ -352,10 +352,10 @@ def test_what_is_wrong_with_a_breakpoint_is_its_message(wanted: dict[str, str], 
 # --------------------------------------------------------------------------- looking, changing
 def test_a_system_has_scopes_for_its_contacts_and_its_own_values() -> None:
     prompt = at_the_prompt(SQUEAL)
-    answered(prompt, "goto 2")
+    answered(prompt, "goto 0.001")
     with adapter() as client:
         client.enter(SQUEAL)
-        client.said("goto 2")
+        client.said("goto 0.001")
         scopes = client.ask("scopes", frameId=client.frames()[0]["id"])["scopes"]
         assert [each["name"] for each in scopes] == ["system", "face", "face 1", "pad", "pad 1"]
         shown = client.values("system") | client.values("pad") | client.values("pad 1")

@@ -108,6 +108,22 @@ def test_a_chair_groans_with_the_frequency_of_its_legs() -> None:
     np.testing.assert_allclose(np.diff(times(chair.simulate(), "release_forward")), due, rtol=1e-5)
 
 
+def test_a_brake_begins_to_squeal_with_the_frequency_of_its_coupled_modes() -> None:
+    """While the pad slides the stiffness is not symmetric: two modes have one frequency."""
+    mu = 0.65
+    stiffness = np.array([[9.3e7, -15588457.268119893 + mu * 4.4e7], [-15588457.268119893, 7.5e7]])
+    modes = np.sqrt(np.linalg.eigvals(stiffness).astype(complex))
+    due = modes.real[0] / (2 * math.pi)
+    assert modes.imag.max() > 100.0
+    trace = loaded("brake_squeal").simulate()
+    first = trace.transitions.t[0]
+    t = np.linspace(0.0, first, 4001)
+    y = trace.sample(t).body("normal").v
+    crossed = t[1:][np.diff(np.sign(y)) != 0]
+    assert crossed.size > 4
+    assert 0.5 / np.diff(crossed[-4:]).mean() == pytest.approx(due, rel=0.02)
+
+
 # --------------------------------------------------------------------------- thresholds
 def test_a_fault_fails_again_and_again_below_the_critical_stiffness() -> None:
     """Ruina's critical stiffness is N (b - a) / D_c = 1.2e7 N/m."""
