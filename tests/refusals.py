@@ -3372,7 +3372,7 @@ rows = {
     "contact of a chart": ("contact", "a", lambda: generate(CHARTS["backlash"], "a")),
     "number for a chart": ("chart", 3, lambda: generate(3)),
     "seed with a point": ("seed", 0.5, lambda: generate(CHARTS["backlash"], seed=0.5)),
-    "unknown bound": ("bounds", "q", lambda: generate(CHARTS["backlash"], bounds={"q": (0, 1)})),
+    "unknown bound": ("bounds", ..., lambda: generate(CHARTS["backlash"], bounds={"q": (0, 1)})),
     "bound of one number": (
         "bounds['v']", 1, lambda: generate(CHARTS["backlash"], bounds={"v": 1})
     ),

@@ -348,6 +348,8 @@ def _unreached(goal: Goal, reasons: Mapping[Goal, str], search: MotionSearch) ->
     what = f"{first.edge} from {first.source}" + "".join(f", after {each.edge}" for each in others)
     if goal in reasons:
         return Unreached(what, "proved", reasons[goal])
+    if event := search.awaited(goal):
+        return Unreached(what, "open", f"it waits for the event {event}, which no motion sends")
     return Unreached(what, "open", f"not proved, and not reached by {search.runs} runs")
 
 

@@ -256,8 +256,18 @@ class MotionSearch:
             self.tried(motion)
         for _ in range(2):
             for goal in self.wanted:
-                if len(goal.edges) == 1 or all(Goal((each,)) in self.found for each in goal.edges):
+                if self._possible(goal):
                     self._reach(goal)
+
+    def awaited(self, goal: Goal) -> str:
+        """Return the event that an edge waits for, which nobody sends; empty if there is none."""
+        named = {(each.name, each.source): each.event for each in self.chart.transitions}
+        return next((named[each] for each in goal.edges if named[each]), "")
+
+    def _possible(self, goal: Goal) -> bool:
+        """Return whether it makes sense to try: an edge that is never taken is in no pair."""
+        alone = len(goal.edges) == 1 or all(Goal((each,)) in self.found for each in goal.edges)
+        return alone and not self.awaited(goal)
 
     @property
     def _short(self) -> float:

@@ -199,3 +199,19 @@ def _near(guards: GuardPoints, point: TurningPoint) -> bool:
         if any(guards.holds(full, {**point.values, name: w}) != here for w in beside):
             return True
     return False
+
+
+def test_a_supervisor_is_tried_by_its_inputs_and_its_events_are_open() -> None:
+    edges = (
+        Transition("on", "cold", "warm", guard="T > 21"),
+        Transition("off", "warm", "cold", guard="T < 19"),
+        Transition("stop", "warm", "cold", event="alarm"),
+    )
+    outputs = State("cold", outputs={"u": "1"}), State("warm", outputs={"u": "0"})
+    found = generate(Chart("room", ("T",), states=outputs, transitions=edges, velocities=()))
+    stopped = ("stop from warm", "stop from warm, after on", "on from cold, after stop")
+    assert {each.what for each in found.open} == {*stopped}
+    assert {each.reason for each in found.open} == {
+        "it waits for the event alarm, which no motion sends"
+    }
+    assert found.pairs.seen == 2
