@@ -139,7 +139,8 @@ class Stand:
     def __post_init__(self) -> None:
         chart = self.contact.chart
         read = frozenset[str]().union(*map(names_in, chart.guards.values()))
-        free = chart.locks or chart.sets_velocity or bool(read & {*chart.rate_names})
+        own = {*chart.parameter_names, *chart.variables, *chart.inputs, *chart.let}
+        free = chart.locks or chart.sets_velocity or bool(read & {*chart.rate_names} - own)
         object.__setattr__(self, "chart", chart)
         object.__setattr__(self, "free", bool(free and chart.velocities))
 

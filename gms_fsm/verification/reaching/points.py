@@ -29,7 +29,7 @@ from gms_fsm.verification._subject import force_name, subject_of
 from gms_fsm.verification._switching import earlier
 from gms_fsm.verification.facts import facts_of
 
-POWERS = range(-9, 4)  # of ten, at which a name is tried before anything is known of its size
+POWERS = range(-9, 8)  # of ten, at which a name is tried before anything is known of its size
 MOST_COMBINATIONS = 300  # of the other names
 FEW = 40  # of them, while levels are searched
 PATIENCE = 60  # points that decide, among which there is none where both sides are equal
