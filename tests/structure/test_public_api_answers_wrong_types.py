@@ -268,6 +268,7 @@ def _by_entry() -> dict[str, dict[str, Any]]:
         "render": {"path": Path("a.dot")},
         "schematic": {"system": SYSTEM},
         "simulate": {"t_end": 1.0},
+        "prepare": {"t_end": 1.0},
         "sweep": {"parameters": {"v_c": [1.0]}},
         "unfold": {"trace": _switching(), "t0": 1.0, "t1": 3.0},
         "write_replay": {"path": Path("a.html")},
@@ -279,7 +280,7 @@ def _right(name: str, call: Callable[..., Any], skipped: int) -> dict[str, Any]:
     found = {}
     for each in list(inspect.signature(call).parameters.values())[skipped:]:
         if each.kind is each.VAR_KEYWORD:
-            if name in ("simulate", "sweep", "Session", "explore", "play"):
+            if name in ("simulate", "prepare", "sweep", "Session", "explore", "play"):
                 found |= {one.name: one.default for one in fields(Settings)}
             mine = [key for key in right() if key.rpartition(".")[0] == name]
             found |= {key.rpartition(".")[2]: right()[key] for key in mine}

@@ -123,26 +123,10 @@ class Prepared:
         return tuple(layout.label(name) for name, _ in layout.y)
 
     def __call__(self, numbers: Mapping[str, ArrayLike] | None = None, /, **more: Any) -> Trace:
-        """Run with these numbers.
+        """Run with these numbers, in a mapping or as keywords where their names allow it.
 
-        Parameters
-        ----------
-        numbers : mapping of str to float or array_like of shape (n,), optional
-            By name: ``{"gear.F_s": 1.2}``.
-        **more
-            Further ones, whose names allow it: ``F_s=1.2``.
-
-        Returns
-        -------
-        Trace
-            As from `simulate`. Rows and log are copied at once, all else is made when it is read.
-
-        Raises
-        ------
-        ParameterError
-            If there is no such number, or its rule is violated.
-        SimulationError
-            As from `simulate`.
+        Rows and log are copied at once, all else of the trace is made when it is read. Numbers that
+        do not exist or violate their rules, and runs that fail, raise what `simulate` raises.
         """
         given = {**numbers, **more} if numbers else more
         run = self._all.run(given)
