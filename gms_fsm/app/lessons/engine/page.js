@@ -60,7 +60,6 @@
     one("#lesson").hidden = !lesson;
     one("#to-lesson").hidden = lesson;
     for (const part of document.body.children) if (part.id !== "lesson") part.inert = lesson;
-    window.dispatchEvent(new Event("resize"));
   };
   one("#to-run").addEventListener("click", () => show(false));
   one("#to-lesson").addEventListener("click", () => { show(true); one("#revealed").hidden = false; });
