@@ -280,7 +280,7 @@ def explain(trace: Trace, row: int, element: int) -> Why:
 
 
 def explain_alone(trace: Trace, row: int, element: int) -> Why:
-    """Explain the edges as `explain` does, without the doubts: those are judged over a whole run."""
+    """Explain the edges as `explain` does, but without the doubts: they concern a whole run."""
     if not -len(trace) <= row < len(trace) or not 0 <= element < trace.n:
         raise IndexError(
             f"row {row}, element {element}: the trace has {len(trace)} rows, {trace.n} elements"

@@ -42,6 +42,7 @@ COMPUTED: dict[int, tuple[float | str, ...]] = {
     9: (1.5 / (2 * 0.1), 0, 0.04 / 0.05, 0.5 * 0.75 * (1 - 0.5**2)),
     10: ("lugre", "gms-published", "gms-signed"),
     11: ("weights2", math.sqrt(1.95 / 0.05), 2 / 0.5),
+    12: (2, 0, 1, "copy"),
 }
 GUESSED: dict[int, tuple[float | str, ...]] = {
     0: (15, "off", 15),
@@ -56,6 +57,7 @@ GUESSED: dict[int, tuple[float | str, ...]] = {
     9: (5, 1e-3, 0.4, 0.5),
     10: ("stiction", "lugre", "elasto-plastic"),
     11: ("k2", 39, 1),
+    12: (3, 1, 2, "both"),
 }
 Ran = Callable[[int], Result]
 SLOW = sorted({*LESSONS} - {0, 1, 9})
