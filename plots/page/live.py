@@ -54,6 +54,7 @@ LIVE = (
     "js/live/live.js",
 )
 ENGINE = "js/live/engine.js"
+LARGE = 200_000  # characters of an engine, which has its records; of such there is only one
 _TABLE = re.compile(r"\[\[?([\w.]+)\]\]?")
 _LINE = re.compile(r"([\w.]+) = (-?[\d.]\S*|\[[-\d.e+, ]+\])")
 
@@ -118,10 +119,11 @@ def play(
     more: Any = {"t_start": t_start, "initial": initial, "settings": settings}
     tree = Session(model, rig, t_end, **more, **options).tree
     start, trace = tree.branch().start, tree.trace(0)
-    variants = [start, *_variants(start)]
+    engine = live_engine(start, trace.title)
+    variants = [start, *(_variants(start) if len(engine.text) < LARGE else ())]
     traces = [trace, *(_beginning(each) for each in variants[1:])]
     data, charts = page_data(traces, title=title)
-    engines = [live_engine(each, trace.title) for each in variants]
+    engines = [engine, *(live_engine(each, trace.title) for each in variants[1:])]
     plane = {each["name"]: each["plane"] for each in data["runs"][0]["contacts"]}
     parts = zip(data["runs"], traces, variants, engines, strict=True)
     data["live"] = {
