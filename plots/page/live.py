@@ -10,6 +10,7 @@ import contextlib
 import importlib.util
 import re
 import tempfile
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -147,8 +148,12 @@ def _variants(start: Problem) -> Iterator[Problem]:
     changes: list[tuple[Any, Any]] = [(with_law, each) for each in LAWS if each != law]
     changes += [(with_elements, n) for n in (count - 1, count + 1) if n]
     for change, to in changes:
-        with contextlib.suppress(ParameterError):  # no published law where F_s = F_c
-            yield Problem.on(change(what, to), start.t_end, start.chosen, **more)
+        made: Mounted | None = None
+        with contextlib.suppress(ParameterError, UserWarning), warnings.catch_warnings():
+            warnings.simplefilter("error")  # the published law where F_s = F_c never arrests
+            made = change(what, to)
+        if made is not None:
+            yield Problem.on(made, start.t_end, start.chosen, **more)
 
 
 def _beginning(start: Problem) -> Trace:
