@@ -8,9 +8,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from gms_fsm import (
+    GMS,
+    GMSParameters,
+    ParameterError,
     Prepared,
+    PulledSlider,
     Trace,
     prepare,
     simulate,
@@ -18,7 +23,7 @@ from gms_fsm import (
 from gms_fsm.errors import GMSError
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in, value_in, varied
-from tests.corpus import CORPUS, FAILING, each, run
+from tests.corpus import CORPUS, FAILING, FEW, QUICK, each, run
 from tests.helpers import FASTEST, other_parts
 from tests.laws.test_a_sweep_is_many_runs import LEFT_OUT
 
@@ -44,7 +49,7 @@ def repeated(ready: Prepared, numbers: dict[str, Any]) -> tuple[Trace | None, st
         return getattr(error, "trace", None), f"{type(error).__name__}: {error}"
 
 
-@each([*CORPUS, *FAILING])
+@each([*CORPUS, *FAILING], {*FEW, *QUICK, *[*FAILING][::4]})
 def test_every_number_can_be_changed(name: str) -> None:
     one = run(name)
     what = mounted(*one.subject)
@@ -64,3 +69,34 @@ def test_every_number_can_be_changed(name: str) -> None:
             assert (end.t, end.y) == (last.t[-1], tuple(last.y[-1].tolist()))
             assert end.transitions == len(theirs.firings)
             assert len(ready.names) == len(end.y)
+
+
+PULLED = GMS(GMSParameters.paper("stick-slip"), law="signed"), PulledSlider(1.0, 2.0, 0.1)
+
+
+def test_numbers_of_single_elements_and_keywords_are_taken() -> None:
+    ready = prepare(*PULLED, 20.0, engine=FASTEST)
+    k = PULLED[0].parameters.k * [1.0, 2.0, 1.0, 1.0]
+    found = ready({"k2": k[1]}, F_s=1.3)
+    ready()  # a run in the same memory leaves the trace as it is
+    what = varied(mounted(*PULLED), {"k": k, "F_s": 1.3})
+    assert other_parts(found, simulate(what.model, what.rig, 20.0, engine=FASTEST)) == []
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [({"F_s": 0.1}, "F_s is 0.1"), ({"f_s": 1.5}, "'f_s'"), ({"k": 0.0}, "> 0")],
+)
+def test_numbers_that_break_their_rules_are_refused(numbers: dict[str, float], said: str) -> None:
+    ready = prepare(*PULLED, 1.0, engine=FASTEST)
+    for call in (ready, ready.end):
+        with pytest.raises(ParameterError, match=said):
+            call(numbers)
+    assert ready.end() == ready.end()
+
+
+def test_numbers_that_are_another_program_are_run_from_new() -> None:
+    ready = prepare(*PULLED, 5.0, engine=FASTEST)
+    what = varied(mounted(*PULLED), {"delta": 1.0})
+    theirs = simulate(what.model, what.rig, 5.0, engine=FASTEST)
+    assert other_parts(ready(delta=1.0), theirs) == []
