@@ -26,7 +26,7 @@ slides: z settles where the bristle carries the friction at this speed, z = s(v)
 ## Predict
 
 A light for pedestrians, as a chart. It begins in its first state, green for the cars. Each edge
-says from which state it leads to which, and what it waits for: an event, or 3 s in its state:
+says from which state it leads to which, and what it waits for: an event, or a time:
 
 ```python
 from gms_fsm import Chart, State, Transition
@@ -45,7 +45,8 @@ light = Chart(
 light
 ```
 
-1. Somebody presses the button every 14 s. How long is it from one red to the next, in s?
+1. Somebody presses the button every 14 s, first at 14 s. How long is it from one red to the next,
+   in s?
 
 A thermostat has two states, too. Its guards read the temperature T of the room, in °C, and each
 state gives out u, which switches the heater. Here low is 19 °C and high is 21 °C:

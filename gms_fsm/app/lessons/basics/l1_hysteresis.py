@@ -16,12 +16,12 @@ is a plain spring and slider.
 ## Predict
 
 Four springs of 40, 30, 20 and 10 N/mm lie in parallel. Each slips when it carries a quarter of the
-friction, 0.25 N. The contact is pulled slowly from 0, beyond the point where the last one slips.
+friction, 0.25 N. The contact is pulled slowly from 0.
 
 1. Where does the first spring slip, in um?
-2. The motion then goes to and fro between reversal points: to A, back to B, up to C, down to D, and
-   up again beyond C and A. How far is the force from its old value when the motion is back at A, in
-   N: 0, a little (0.01), or much (0.1)?
+2. The motion goes from 0 up to A, back to B, up to C below A, down to D above B, and up again past
+   C and A. How far is the force from its old value when the motion is back at A, in N: 0, a little
+   (0.01), or much (0.1)?
 
 ## Measure
 

@@ -17,7 +17,7 @@ of w_i = 0.25/k_i (chosen by us): an element really slips and arrests, and then 
 
 A mass of 1 kg is pushed with 0.5 N, then with a constant 0.25 N; a vibration of ±0.1 N at 2 Hz is
 added. The friction can hold up to 1.5 N, far more than that: s(v) falls from 1.5 N at rest to 1.1 N
-at 1.3 mm/s, the largest speed of the vibration. Two models have a stiffness of
+at 1.3 mm/s, about the largest speed of the vibration. Two models have a stiffness of
 sigma_0 = 1000 N/m and carry F = sigma_0 z:
 
 - LuGre, whose bristle yields at any load: x - z grows at the rate sigma_0 |v| z / s(v);
@@ -48,9 +48,9 @@ the same.
 
 LuGre's bristle yields under any load, in proportion to the distance moved, whichever way the slider
 moves. The vibration moves it by 0.1 N / 1000 N/m = 0.1 mm each way, 0.8 mm in a second; of that it
-keeps the share F/s, about 0.25/1.2: 0.17 mm/s. It is a little more, since the load is largest where
-s(v) is smallest. A GMS element below its threshold is a spring: what it gives way it takes back.
-What is left is rounding.
+keeps the share F/s, about 0.25/1.2: 0.17 mm/s. It is a little more, mainly because the mass swings
+along: at 2 Hz its inertia makes the stroke almost a fifth longer. A GMS element below its threshold
+is a spring: what it gives way it takes back. What is left is rounding.
 
 ## Vary a parameter
 

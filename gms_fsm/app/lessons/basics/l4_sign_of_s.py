@@ -22,8 +22,9 @@ periods. In sliding s = 0.4 m: an element breaks away at z = 0.4 m or -0.4 m. Th
 1. With the signed law: what is the largest |z| of all elements, in m?
 2. With the published law the first element, C = 0.1 m/s, breaks away backward at 20.1 s, at
    z = -0.4 m, and slips until the motion reverses at 25 s. What is z then, in m?
-3. After four periods of the published law: is the energy in the springs "less" than the work that
-   was put in, the "same", or "more"?
+3. An element that slips backward by the published law stretches its spring further than the slider
+   moves. After four periods: is the energy in the springs "less" than the work that was put in, the
+   "same", or "more"?
 
 ## Measure
 

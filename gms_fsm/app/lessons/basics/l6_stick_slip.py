@@ -8,8 +8,8 @@ surplus force throws it forward until the spring is slack enough for it to stop.
 again.
 
 A cycle thus has two different parts. The wait is the time needed to stretch the spring again by
-the same amount: a length divided by V. The slip is half an oscillation of a mass on a spring and
-hardly depends on V. At a high speed the mass no longer comes to rest and slides.
+the same amount: a length divided by V. The slip is a swing of a mass on a spring and hardly
+depends on V. At a high speed the mass no longer comes to rest and slides.
 
 ## Predict
 
@@ -18,8 +18,8 @@ and falls to 1 N in sliding, from about 0.05 m/s on; to that comes a viscous fri
 sigma_2 = 0.4 Ns/m.
 
 1. V = 0.1 m/s: with which force does the spring pull when the mass begins to slide, in N?
-2. And when it comes to rest again, in N? It swings about the force of sliding, and sigma_2 damps
-   the swing.
+2. And when it comes to rest again, in N? It swings about the force of steady sliding,
+   F_c + sigma_2 V, and sigma_2 damps the swing.
 3. At V = 0.01 m/s, how long is a period of stick and slip, in s?
 
 ## Measure
@@ -46,7 +46,9 @@ The mass begins to slide at F_s. The surplus of 0.5 N accelerates it, and it ove
 damping the spring would end as far below the force of sliding as it began above it. A mass of 1 kg
 on 2 N/m with 0.4 Ns/m has a damping ratio of 0.4/(2 √2) = 0.14, so that half a swing leaves 64 %:
 from about 0.46 N above 1.04 N to 0.3 N below it, 0.75 N. Friction does not fall at once, so that it
-is a little more. The wait is the time to stretch the spring again by some 0.36 m, at 0.01 m/s.
+is a little more. The wait is the time to stretch the spring again by some 0.36 m: 36 s at 0.01 m/s.
+To it comes the slip. Half a swing would take 2.2 s; it takes longer, because it starts slowly:
+friction falls only as the speed grows.
 
 ## Vary a parameter
 

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from gms_fsm.app.lessons.engine.lesson import Result
 
 
+WHOLE = 0.5  # the tolerance of a number that is counted
+
+
 @dataclass(frozen=True)
 class Question:
     """What a reader predicts before a run, and when the prediction is right.
@@ -55,7 +58,10 @@ class Question:
         if self.choices:
             *others, last = (f'"{each}"' for each in self.choices)
             return f"{', '.join(others)} or {last}"
-        return ", ".join(filter(None, [self.unit, f"within {self.tolerance}"]))
+        if self.atol == WHOLE and not self.unit:
+            return "a whole number"
+        of = " of the value" * (self.unit.startswith("%") and bool(self.rtol))
+        return ", ".join(filter(None, [self.unit, f"within {self.tolerance}{of}"]))
 
 
 def judged(
@@ -90,10 +96,8 @@ def compare(result: Result, **predictions: float | str | None) -> None:
     Examples
     --------
     >>> from gms_fsm.app.lessons import lesson
-    >>> result = lesson(9).run()
-    >>> compare(result, released=7.5, speed_while_stuck=0)
-    You predicted 7.5 s. Measured: 7.5 s. Right, within 2 %.
-    You predicted 0 m/s. Measured: 0 m/s. Right, within 0.0001 m/s.
+    >>> compare(lesson(9).run(), released=None)
+    You predicted nothing. Measured: 7.5 s.
     """
     for question in result.lesson.questions:
         if question.name in predictions:

@@ -28,8 +28,8 @@ fit is to find k1, k2, weights1 and weights2 again.
    count for n (1 - a)/(1 + a). By which factor are intervals too short if all rows are taken for
    independent?
 3. In a third fit F_c and F_s are free as well. A threshold is weight times s(v), and s(v) is
-   proportional to F_c and F_s. Two fits begin at F_c = 0.5 N and 2 N. What is the ratio of the
-   values of F_c that they find?
+   proportional to F_c and F_s. Two fits begin at F_c = 0.5 N and 2 N, both with the same
+   thresholds. What is the ratio of the larger to the smaller F_c that they find?
 
 ## Measure
 
@@ -62,7 +62,8 @@ n rows count for n (1 - 0.95)/(1 + 0.95), about 1 in 39; intervals are therefore
 longer. A fit estimates the correlation from its residuals, so that its factor scatters around that.
 
 Every threshold is w s(v). With twice the curve s(v) and half the weights w nothing changes, so that
-the ratio of the two values of F_c is that of the starts: the fit has no reason to move.
+the ratio of the two values of F_c is that of the starts: both may move by the same factor, but
+nothing in the record moves them towards each other.
 
 ## What the tables say
 

@@ -12,8 +12,10 @@ counts what was asked:
 - MC/DC (modified condition/decision coverage): each comparison seen to decide alone. For ``a and
   b`` that takes three points: both true, only a false, only b false.
 
-Below, one slipping element, signed law, whose threshold s is 15 mm at rest and 10 mm at speed. A
-colleague has copied its chart, and has lost one sign in one guard:
+## Predict
+
+One slipping element, signed law, whose threshold s is 15 mm at rest and 10 mm at speed. A colleague
+has copied its chart, and has lost one sign in one guard:
 
 | edge | from | guard | the copy |
 |---|---|---|---|
@@ -21,9 +23,8 @@ colleague has copied its chart, and has lost one sign in one guard:
 | break_away_backward | stick | ``z <= -s and v < -v_c`` | ``z <= -s and v < v_c`` |
 | arrest | slip | ``abs(v) <= v_c and abs(z) < s`` | the same |
 
-v_c = 1 mm/s is the speed below which an element may arrest.
-
-## Predict
+v_c = 1 mm/s is the speed below which an element may arrest. A comparison of a guard has *decided
+alone* if it was seen both true and false while the other one was true.
 
 Two runs first: a mass of 1 kg is pulled forward through a spring of 2 N/m at 0.1 m/s for 40 s, and
 sticks and slips; a slider is moved at 0.2 + 0.1 sin(t) m/s for 10 s. A third run moves to and fro,
@@ -49,7 +50,8 @@ these runs.
 
 Measured: {motions} generated motions take all edges, all {pairs} pairs of edges, and see every
 comparison decide; {telling} of them tell the copy apart. One begins in stick at z = {z!m:.1f} mm
-with v = {v!m:.3g} mm/s, which is -v_c. At rest, bent to z = -s, the {slips_at_rest} slips at once.
+(put there, beyond the threshold) with v = {v!m:.3g} mm/s, which is -v_c. At rest, bent to z = -s,
+the {slips_at_rest} slips at once.
 
 So: runs that look good test what they ask. An edge that was taken says that its guard was true
 once, not which comparison decided it; a motion made for a comparison asks just there.

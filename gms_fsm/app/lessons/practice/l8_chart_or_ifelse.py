@@ -26,8 +26,9 @@ break away together at v = 0.14 m/s.
 1. How many differ, with the same driver and located switches?
 2. Now the if-else code evaluates its guards once per step of 1 ms. How large is the largest
    difference of the force just after the first break-away, in N?
-3. At 12.5 s the motion reverses, and |v| is small enough for the elements to arrest for 50 us. Is
-   the largest difference after that "smaller", the "same" or "larger" than at the break-away?
+3. At 12.5 s the motion reverses, and |v| is small enough for the elements to arrest for 50 us only.
+   In the run that misses this they go on slipping. Is the largest difference after that "smaller",
+   the "same" or "larger" than at the break-away?
 
 ## Measure
 

@@ -25,7 +25,8 @@ merely small. Each of these statements is checked here on a run, against a formu
 1. A mass with Coulomb stiction (F_s = 1.5 N) is pulled from rest through a spring of 2 N/m at
    0.1 m/s. When is it released, in s?
 2. What is the largest speed it has while it is stuck, in m/s?
-3. A motor turns a load through a gear at 0.05 rad/s, to and fro. A tooth has 0.04 rad to cross from
+3. A motor turns a load to and fro through a gear: its speed jumps from 0.05 to -0.05 rad/s and
+   back. A bearing stops the load at once when nothing drives it. A tooth has 0.04 rad to cross from
    one flank to the other. How long is the load without contact at a reversal, in s?
 4. A mass of 1 kg at 1 m/s hits one of 3 kg at rest; the restitution is 0.5. How much energy is
    lost, in J?
