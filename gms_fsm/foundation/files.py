@@ -13,6 +13,7 @@ import errno
 import hashlib
 import io
 import json
+import mimetypes
 import os
 import re
 import secrets
@@ -35,22 +36,6 @@ _LEFT = re.compile(r"\..+\.[0-9a-f]{16}\.gms-fsm-(part|rest)")
 
 
 # --------------------------------------------------------------------------- folders
-# Endings of files: a folder that is called so was meant as one of them.
-OF_FILES = (
-    ".png",
-    ".svg",
-    ".pdf",
-    ".gif",
-    ".mp4",
-    ".html",
-    ".md",
-    ".csv",
-    ".npz",
-    ".json",
-    ".toml",
-)
-
-
 def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
     """Create a folder for output and make sure that it is writable, before any work is done.
 
@@ -72,7 +57,7 @@ def output_folder(path: str | Path, names: Iterable[str] = ()) -> Path:
             f"cannot create the folder {str(folder)!r}: it contains a null byte",
             advice="choose another folder",
         )
-    if folder.suffix.lower() in OF_FILES and not folder.exists():
+    if mimetypes.guess_type(folder.name)[0] and not folder.exists():  # it was meant as a file
         raise OutputError(
             f"it is the name of a {folder.suffix} file, and several files are written to a folder",
             place=str(folder),

@@ -227,7 +227,7 @@ OF_ANOTHER_PLACE = {  # what is often given where it does not belong, by the nam
 def misplaced(given: object) -> str:
     """Return what to do with an object that stands where it does not belong; empty if unknown.
 
-    >>> misplaced(PulledSlider(1.0, 2.0, 0.1))
+    >>> misplaced(Prescribed("0.1"))
     'it is a rig, simulate(model, rig, t_end) takes it second'
     """
     if isinstance(given, type):

@@ -358,25 +358,33 @@ def _library(
     if content is None:
         started = time.perf_counter()
         notify("compiling, once for each chart and method ...")
-        translator = Translator(INLINE)
-        made = [
-            translator.entry(
-                entry.name,
-                entry.function,
-                [
-                    *map(layout.part, entry.parts.split() or layout.value.fields),
-                    *(NumberValue(Local("i", extra)) for extra in entry.extra),
-                ],
-            )
-            for entry in entries
-        ]
-        if each:
-            translator.for_each("each", made[0], layout.words)
+        translator = translated(layout, entries, each=each)
         content = objects.compiled(llvm_text(translator.module))
         if store is not None:
             store.put(name, content)
         notify(f"compiled in {time.perf_counter() - started:.1f} s")
     return Library(content)
+
+
+def translated(
+    layout: BlockLayout, entries: Sequence[EntryPoint], *, each: bool = False
+) -> Translator:
+    """Return functions on a block, translated; ``each`` calls the first one for many blocks."""
+    translator = Translator(INLINE)
+    made = [
+        translator.entry(
+            entry.name,
+            entry.function,
+            [
+                *map(layout.part, entry.parts.split() or layout.value.fields),
+                *(NumberValue(Local("i", extra)) for extra in entry.extra),
+            ],
+        )
+        for entry in entries
+    ]
+    if each:
+        translator.for_each("each", made[0], layout.words)
+    return translator
 
 
 def _longest(arguments: Any) -> int:

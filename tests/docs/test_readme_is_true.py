@@ -75,8 +75,8 @@ SHOWN = {
     "debugger_brake": [
         "pad 1: friction under a varying load",
         "locked: v = 0",
-        "-7.362 N",
-        "x = -68.63 mm",
+        "0.3594 kN",
+        "x = -8.579 µm",
     ],
     "live": [
         "t = 0.29000 s",

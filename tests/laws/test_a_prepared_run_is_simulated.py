@@ -64,7 +64,7 @@ def test_every_number_can_be_changed(name: str) -> None:
         ours, too = repeated(ready, numbers)
         assert too == why
         assert other_parts(theirs, ours) == []
-        if not why and theirs is not None:
+        if not why and theirs is not None and "t_eval" not in one.how:
             end, last = ready.end(numbers), theirs.rows
             assert (end.t, end.y) == (last.t[-1], tuple(last.y[-1].tolist()))
             assert end.transitions == len(theirs.firings)

@@ -34,9 +34,6 @@ from gms_fsm.run.recording import compiled_run
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import system_of
 from integrators.machine_code.c99 import c99_text
-from integrators.machine_code.front_end.translate import Translator
-from integrators.machine_code.front_end.values import NumberValue
-from integrators.machine_code.tree import Local
 from integrators.runners import compiled
 from tests.helpers import FASTEST, ROOT, bits
 from tests.soak.random_systems import SHAPES, T_END, trial
@@ -134,14 +131,9 @@ def in_c(compiler: str, level: str, warnings: Sequence[str] = ("-w",)) -> Iterat
     with tempfile.TemporaryDirectory() as folder:
         texts: list[str] = []
 
-        def library(
-            text: str, function: Any, arguments: Any, layout: Any, extra: Sequence[str], *_: Any
-        ) -> CLibrary:
-            translator = Translator(compiled.INLINE)
-            more = [NumberValue(Local("i", each)) for each in extra]
-            translator.entry("entry", function, [*layout.value.fields.values(), *more])
-            texts.append(c99_text(translator.module))
-            source = Path(folder) / f"{function.__name__}{len(texts)}.c"
+        def library(text: str, arguments: Any, layout: Any, entries: Any, *_: Any) -> CLibrary:
+            texts.append(c99_text(compiled.translated(layout, entries).module))
+            source = Path(folder) / f"{entries[0].function.__name__}{len(texts)}.c"
             source.write_text(texts[-1], encoding="utf-8")
             made = source.with_suffix(".so")
             command = [compiler, *FLAGS, *warnings, level, str(source), "-o", str(made), "-lm"]

@@ -261,7 +261,7 @@ def test_a_sweep_keeps_no_rows_to_count(engine: str, monkeypatch: pytest.MonkeyP
     def none(trace: Trace) -> None:
         raise AssertionError("counted from rows")
 
-    monkeypatch.setattr("gms_fsm.run.sweep.of_trace", none)
+    monkeypatch.setattr("gms_fsm.run.repeated.collected.of_trace", none)
     given: Any = (stick_slip("signed"), Prescribed(FIG4_SINE), 30.0, SWEPT)
     assert coverage(sweep(*given, engine=engine, coverage=True)) == coverage(_runs())
 

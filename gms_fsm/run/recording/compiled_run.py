@@ -215,13 +215,16 @@ class Columns:
 
     def write(self) -> None:
         """Write everything that machine code reads into the block."""
+        places: Any = self.run_of.functions.p
+        places[0][...], places[1][...] = self.p[:2]
+        self.place()
+
+    def place(self) -> None:
+        """Write where the columns are, and all numbers except those of the system."""
         functions = self.run_of.functions
-        places: Any = functions.p
-        shared, own, tables = self.p
-        places[0][...], places[1][...] = shared, own
         self.block.update(
             self.run_of._replace(
-                functions=functions._replace(p=(*places[:2], tables)),
+                functions=functions._replace(p=(*functions.p[:2], self.p[2])),
                 buffers=self.buffers,
                 tally=self._tally(),
             )

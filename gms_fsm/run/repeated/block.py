@@ -160,7 +160,7 @@ class RepeatedRun:
     def _write(self) -> None:
         """Say where the columns are, now and whenever a run begins."""
         scale = self.floats[self.scale]
-        self.columns.write()
+        self.columns.place()
         self.floats[self.scale] = scale
         words = self.columns.block.words
         for offset, lengths, _ in self.columns.block.layout.column_offsets.values():
