@@ -360,12 +360,15 @@ def _many(
         start = begin.start(what)
         driven = any(body.driven and what.named for body in what.system.bodies)
         repeatable = start.output == "end" and start.chosen.engine == "compiled" and not driven
-        _of_thread.sweep_name, _of_thread.runs, _of_thread.run = sweep_name, None, None
-        if repeatable and (runs := RepeatedRuns(start)).known is not None:
-            _of_thread.runs, _of_thread.run = runs, RepeatedRun(start, tables)
-    run: RepeatedRun | None = _of_thread.run
-    cells = None if run is None else _of_thread.runs.cells(part)
-    if run is None or cells is None or not cells.certain.any():
+        runs = RepeatedRuns(start) if repeatable else None
+        _of_thread.sweep_name, _of_thread.runs, _of_thread.run = sweep_name, runs, None
+    cells = None if _of_thread.runs is None else _of_thread.runs.cells(part)
+    if cells is None or not cells.certain.any():
+        return None
+    if _of_thread.run is None:
+        _of_thread.run = RepeatedRun(_of_thread.runs.start, tables)
+    run: RepeatedRun = _of_thread.run
+    if not run.columns.block.is_whole:  # to begin anew is to copy it
         return None
     which = np.flatnonzero(cells.certain)
     found = run.many(cells.places, np.ascontiguousarray(cells.values[which]), tables)

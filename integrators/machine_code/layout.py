@@ -315,6 +315,11 @@ class MemoryBlock:
         """The memory."""
         return self._words
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether all arrays of the example are inside."""
+        return not self._outside
+
     def become(self, like: MemoryBlock) -> None:
         """Take over what another block contains.
 

@@ -15,6 +15,7 @@ import tracemalloc
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ from gms_fsm.errors import SignalError, TraceFileError
 from gms_fsm.run.sweep import _interrupts_deferred
 from gms_fsm.systems.models import GMS, parameter_names, with_values
 from tests.corpus import ENGINES, LUGRE, RECORD
-from tests.helpers import FASTEST, pulled_mass, stick_slip
+from tests.helpers import FASTEST, bank, pulled_mass, stick_slip
 from tests.laws.test_a_sweep_is_many_runs import same
 from tests.systems_cases import two_blocks
 
@@ -420,6 +421,22 @@ def test_the_next_run_of_a_task_does_not_write_into_the_rows_of_the_one_before()
         parameters: GMSParameters = model.parameters.replaced(k=k[run])
         alone = simulate(GMS(parameters, law="signed"), rig, 5.0, t_eval=times, engine=FASTEST)
         np.testing.assert_array_equal(found.rows["z"][run], alone.z)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [4, 100])
+def test_many_runs_at_once_are_those_alone(n: int) -> None:
+    """A bank of 100 elements does not fit into the block that is copied between two runs."""
+    model, rig = bank(n), Prescribed("2 * sin(4 * t)")
+    F_s = np.linspace(1.1, 2.0, 130)  # two runs in each task
+    found = sweep(model, rig, 2.0, {"F_s": F_s}, engine=FASTEST)
+    for run in (0, 1, 2, 129):
+        curve = replace(model.stribeck, F_s=float(F_s[run]))
+        parameters: GMSParameters = model.parameters.replaced(stribeck=curve)
+        alone = simulate(GMS(parameters, law=model.law), rig, 2.0, engine=FASTEST)
+        np.testing.assert_array_equal(found.z[run], alone.z[-1])
+        assert found.F[run] == alone.F[-1]
+        assert found.transition_count[run] == len(alone.transitions) > 0
 
 
 @pytest.mark.slow
