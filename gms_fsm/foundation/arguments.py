@@ -235,6 +235,8 @@ def pointing(ours: Mapping[str, str]) -> Callable[[Kind], Kind]:
                 vars(self).update(vars(make()))
                 vars(self).pop(LATER, None)
                 return getattr(self, name)
+            if name in vars(self):  # another thread has just made it
+                return vars(self)[name]
             if hasattr(kind, name):
                 return object.__getattribute__(self, name)  # raises what the property has raised
             cure = f"; write {ours[name]}" if name in ours else ""

@@ -100,3 +100,27 @@ def test_numbers_that_are_another_program_are_run_from_new() -> None:
     what = varied(mounted(*PULLED), {"delta": 1.0})
     theirs = simulate(what.model, what.rig, 5.0, engine=FASTEST)
     assert other_parts(ready(delta=1.0), theirs) == []
+
+
+def test_traces_are_their_own_whatever_is_run_after_them() -> None:
+    times = np.linspace(0.0, 20.0, 101)
+    ready = prepare(*PULLED, 20.0, engine=FASTEST, t_eval=times)
+    k = 1.5 * PULLED[0].parameters.k
+    found = [ready(mass=mass, k=k) for mass in (0.5, 3.0)]
+    k[:] = 1.0
+    for trace, mass in zip(found, (0.5, 3.0), strict=True):
+        what = varied(mounted(*PULLED), {"mass": mass, "k": 1.5 * PULLED[0].parameters.k})
+        theirs = simulate(what.model, what.rig, 20.0, engine=FASTEST, t_eval=times)
+        assert other_parts(trace, theirs) == []
+
+
+def test_an_exponent_of_two_is_another_program_from_either_side() -> None:
+    what = varied(mounted(*PULLED), {"delta": 1.5})
+    ready = prepare(what.model, what.rig, 20.0, engine=FASTEST)
+    assert other_parts(ready(delta=2.0), simulate(*PULLED, 20.0, engine=FASTEST)) == []
+
+
+@pytest.mark.parametrize("mass", [10**400, np.array([]), np.array([1.0, 2.0])], ids=str)
+def test_what_is_no_number_for_it_is_refused(mass: Any) -> None:
+    with pytest.raises(ParameterError, match="mass"):
+        prepare(*PULLED, 1.0, engine=FASTEST)(mass=mass)

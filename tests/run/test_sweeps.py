@@ -32,6 +32,7 @@ from gms_fsm import (
     Stribeck,
     Sweep,
     Transition,
+    coverage,
     simulate,
     sweep,
 )
@@ -437,6 +438,29 @@ def test_many_runs_at_once_are_those_alone(n: int) -> None:
         np.testing.assert_array_equal(found.z[run], alone.z[-1])
         assert found.F[run] == alone.F[-1]
         assert found.transition_count[run] == len(alone.transitions) > 0
+
+
+@pytest.mark.slow
+def test_runs_that_go_one_by_one_end_with_their_own_force() -> None:
+    model, rig = pulled_mass()
+    force = np.linspace(1.0, 1.5, 130)  # F_s = F_c is looked at; two runs in each task
+    values = {"F_s": force, "F_c": force, "sigma_2": np.linspace(0.0, 9.0, 130)}
+    found = sweep(model, rig, 0.3, values, engine=FASTEST)
+    for run in (0, 1, 3, 129):
+        own = with_values(model, {name: float(each[run]) for name, each in values.items()})
+        assert found.F[run] == simulate(own, rig, 0.3, engine=FASTEST).F[-1]
+
+
+@pytest.mark.slow
+def test_rows_are_counted_once_where_the_log_grows() -> None:
+    model, rig = stick_slip("signed"), Prescribed("2 * sin(2 * pi * t)")
+    values = np.linspace(1.6, 2.0, 3)
+    found = sweep(model, rig, 60.0, {"F_s": values}, coverage=True, engine=FASTEST)
+    assert found.transition_count.min() > 256  # so many have room at first
+    alone = [
+        simulate(with_values(model, {"F_s": each}), rig, 60.0, engine=FASTEST) for each in values
+    ]
+    assert coverage(found) == coverage(alone)
 
 
 @pytest.mark.slow

@@ -97,6 +97,7 @@ class CompiledRun:
     def reset(self, what: Mounted) -> None:
         """Start over with different numbers; signals and initial values stay."""
         self.columns.reset(what)
+        self.start = self.columns.start
         self.next_look = PATIENCE
 
     def advance(self) -> bool:
@@ -257,7 +258,7 @@ class Columns:
     def empty(self) -> None:
         """Empty the columns and return to the start."""
         if self.handed_out:
-            self._replace_rows()
+            self.replace_rows()
         self.packed = ()
         start, log = self.start, self.log
         b: Any = self.buffers  # arrays
@@ -284,7 +285,7 @@ class Columns:
         self.buffers = b._replace(plan=b.plan._replace(control=control))
         log.firings, log.stops = 0, min(1, len(log.stops_t))
 
-    def _replace_rows(self) -> None:
+    def replace_rows(self) -> None:
         """Leave the columns of rows to the trace that has them."""
         out: Any = self.buffers.out
         layout = self.start.program.layout
@@ -349,7 +350,7 @@ class Columns:
         rest = [column[taken:count].copy() for column in self._columns()]
         self.packed += (packed(_rows(taken, *self._columns())),)
         if self.handed_out:
-            self._replace_rows()
+            self.replace_rows()
         for column, rows in zip(self._columns(), rest, strict=True):
             column[: count - taken] = rows
         b.memory.taken, b.out.row = 0, count - taken
@@ -468,13 +469,13 @@ def _prepared(start: Problem, counting: Counting | None) -> compiled.ReadyCode:
     program = start.program
     flow = "flow" if start.options.located else "flow_live"
     key = id(program.functions), flow, start.options.method, counting is not None
-    if key not in _known:
+    if (ready := _known.get(key)) is None:
         if len(_known) >= compiled.MOST_ENGINES:
             _known.clear()
         run = example_of(start, counting)._replace(more=following_of(start))
         engine = compiled.engine(program, run, counting)
-        _known[key] = compiled.ReadyCode(engine, run, program.functions)
-    return _known[key]
+        _known[key] = ready = compiled.ReadyCode(engine, run, program.functions)
+    return ready
 
 
 def example_of(start: Problem, counting: Counting | None = None) -> RecordArguments:

@@ -46,6 +46,14 @@ class CountTables:
         counts = np.zeros(counting.counts, dtype=np.int64)
         return cls(counting, counts, np.full(counting.distances, np.inf))
 
+    def copy(self) -> CountTables:
+        """Return tables with the same counts."""
+        return CountTables(self.counting, self.counts.copy(), self.near.copy())
+
+    def become(self, other: CountTables) -> None:
+        """Take over the counts of other tables."""
+        self.counts[:], self.near[:] = other.counts, other.near
+
     def add(self, other: CountTables) -> None:
         """Add the counts of other runs."""
         np.add(self.counts, other.counts, out=self.counts)

@@ -72,6 +72,7 @@ class RepeatedRun:
     def put(self, numbers: Iterable[tuple[Place, Any]]) -> None:
         """Return to the start, with some other numbers."""
         self.columns.block.restore(self.first)
+        self.columns.packed = ()
         for (row, own, element), value in numbers:
             if not own:
                 self.shared[row] = value
@@ -142,12 +143,15 @@ class RepeatedRun:
         columns.run_of = columns.run_of._replace(more=more._replace(repeats=repeats))
         self._write()
         columns.block.restore(self.first)
-        made = 0
+        made, counted = 0, tables and tables.copy()
         while (made := self._repeat(columns.block.address, made, runs, STEPS)) < runs:
             fired = columns.log.firings
             columns.make_room_for_firings()
             self._write()
             columns.log.firings = fired
+            if tables is not None and counted is not None:  # it has counted a part of this run
+                tables.become(counted)
+                made = columns.log.firings = 0
         log, count = columns.log, columns.log.firings
         switches = log.t[:count], log.machine[:count], log.edge[:count], log.numbers[:count]
         return found._replace(log=tuple(each.copy() for each in switches))
@@ -173,8 +177,8 @@ class RepeatedRun:
         if columns.start.output != "all" or columns.packed:
             found = columns.contents()
             if columns.handed_out:
-                self._make_room()
-            columns.packed = ()
+                columns.replace_rows()
+                self._write()
             return lambda: found
         out, log = columns.buffers.out, columns.log
         count, fired = out.row, log.firings

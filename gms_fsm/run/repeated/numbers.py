@@ -19,11 +19,13 @@ from gms_fsm.systems import rigs
 from gms_fsm.systems.given import is_positive
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import joined, known_in, label_in, numbers_of, varied
+from gms_fsm.systems.reading.values import CURVE
 from gms_fsm.systems.reading.values import numbers_of as values_of_system
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.springs import field_of
 
 MOST_SPARE = 4  # runs that wait to be repeated
+EXACT = 2**53  # whole numbers that are floats
 
 
 def with_given(what: Mounted, given: Mapping[str, Any]) -> Mounted:
@@ -71,10 +73,14 @@ class KnownNumber:
 
     def takes(self, value: Any) -> bool:
         """Return whether a value fulfils the rule, as far as numbers alone decide."""
+        if isinstance(value, int) and abs(value) > EXACT:
+            return False
         if not isinstance(value, float | int):
             if not (isinstance(value, np.ndarray) and value.dtype == float):
                 return False
-            if value.shape not in ((), (self.n,)) or not np.isfinite(value).all():
+            if value.shape not in ((), (self.n or 1,)) or not np.isfinite(value).all():
+                return False
+            if value.ndim and not self.n:
                 return False
             return all(bound.holds(value, bound.limit).all() for bound in self.bounds)
         if self.nonzero and value == 0.0:
@@ -218,7 +224,8 @@ def known_numbers(start: Problem) -> dict[str, KnownNumber]:
     found: dict[str, KnownNumber] = {}
     for name, (parameter, n) in names.items():
         label = label_in(what, name)
-        if label in places and label not in careful:
+        # An exponent of 2 is another program.
+        if label in places and label not in careful and not label.endswith(f"{CURVE}delta"):
             found[name] = KnownNumber(
                 places[label],
                 n,
@@ -240,7 +247,7 @@ def known_numbers(start: Problem) -> dict[str, KnownNumber]:
                     found.pop(name, None)
                     found.pop(other, None)
     for name, one in numbers_of(what).items():
-        if one.element is not None and one.whole in found:
+        if one.element is not None and one.whole in found and name not in names:
             whole = found[one.whole]
             found[name] = replace(whole, place=whole.place._replace(element=one.element), n=0)
     return found

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Unpack
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.foundation.arguments import later, refusing
@@ -128,7 +130,7 @@ class Prepared:
         Rows and log are copied at once, all else of the trace is made when it is read. Numbers that
         do not exist or violate their rules, and runs that fail, raise what `simulate` raises.
         """
-        given = {**numbers, **more} if numbers else more
+        given = _own({**numbers, **more} if numbers else more)
         run = self._all.run(given)
         if run is None:
             return self._alone(given, self.start.chosen)
@@ -156,7 +158,7 @@ class Prepared:
         ParameterError, SimulationError
             As for a call.
         """
-        given = {**numbers, **more} if numbers else more
+        given = _own({**numbers, **more} if numbers else more)
         run = self._ends.run(given)
         if run is None:
             trace = self._alone(given, self._ends.start.chosen)
@@ -205,3 +207,11 @@ class Prepared:
         while run.advance():
             pass
         return run.recorder.trace()
+
+
+def _own(given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return numbers that nobody else changes."""
+    for value in given.values():
+        if isinstance(value, np.ndarray | list):
+            return copy.deepcopy(dict(given))
+    return given
