@@ -43,6 +43,11 @@ def with_given(what: Mounted, given: Mapping[str, Any]) -> Mounted:
     return varied(what, parts)
 
 
+def problem_with(start: Problem, given: Mapping[str, Any]) -> Problem:
+    """Return a problem with other numbers; a `ParameterError` if one breaks its rule."""
+    return start.with_numbers(with_given(start.what, given))
+
+
 # --------------------------------------------------------------------------- numbers in a block
 @dataclass(frozen=True, eq=False)
 class KnownNumber:
@@ -78,9 +83,8 @@ class KnownNumber:
         if not isinstance(value, float | int):
             if not (isinstance(value, np.ndarray) and value.dtype == float):
                 return False
-            if value.shape not in ((), (self.n or 1,)) or not np.isfinite(value).all():
-                return False
-            if value.ndim and not self.n:
+            shapes = [(), (self.n,)][: 1 + (self.n > 0)]
+            if value.shape not in shapes or not np.isfinite(value).all():
                 return False
             return all(bound.holds(value, bound.limit).all() for bound in self.bounds)
         if self.nonzero and value == 0.0:
@@ -141,7 +145,7 @@ class RepeatedRuns:
         run.put(puts)
         if all(one.fits(run) for one in found) and self._move(given, found):
             run.follow()
-            if run.run(lambda: self._with(given)):
+            if run.run(lambda: problem_with(self.start, given)):
                 return run
         self.take_back(run)
         return None
@@ -190,9 +194,6 @@ class RepeatedRuns:
         numbers = dict(system.numbers)
         numbers |= {label_in(self.start.what, name): value for name, value in given.items()}
         return all(is_positive(tree, numbers) for tree in inertias)
-
-    def _with(self, given: Mapping[str, Any]) -> Problem:
-        return self.start.with_numbers(with_given(self.start.what, given))
 
 
 def is_repeatable(start: Problem) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from gms_fsm.foundation.arguments import later, refusing
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
-from gms_fsm.run.repeated.numbers import RepeatedRuns, with_given
+from gms_fsm.run.repeated.numbers import RepeatedRuns, problem_with, with_given
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.systems.models import Model
@@ -34,7 +34,7 @@ class RunEnd(NamedTuple):
     t : float
         s.
     y : tuple of float
-        The state; `Prepared.names` has the names of its components.
+        The state, in SI units; `Prepared.names` has the names of its components.
     states : tuple of str
         Active state of each element, of a system contact after contact.
     transitions : int
@@ -136,8 +136,10 @@ class Prepared:
             return self._alone(given, self.start.chosen)
         contents = run.taken()
         self._all.take_back(run)
-        initial = self.start.initial
-        made: Trace = later(Trace, lambda: self._with(given).trace(*contents()), initial=initial)
+        start = self.start
+        made: Trace = later(
+            Trace, lambda: problem_with(start, given).trace(*contents()), initial=start.initial
+        )
         return made
 
     def end(self, numbers: Mapping[str, ArrayLike] | None = None, /, **more: Any) -> RunEnd:
@@ -195,10 +197,6 @@ class Prepared:
     def _again(self, what: Mounted, chosen: Settings) -> Problem:
         start = self.start
         return Problem.on(what, start.t_end, chosen, t_start=start.t_start, initial=start.initial)
-
-    def _with(self, given: Mapping[str, Any]) -> Problem:
-        """Return the problem with other numbers; a `ParameterError` if one breaks its rule."""
-        return self.start.with_numbers(with_given(self.start.what, given))
 
     def _alone(self, given: Mapping[str, Any], chosen: Settings) -> Trace:
         """Run as `simulate` does, from new: numbers that change the program, and errors."""
