@@ -83,8 +83,8 @@ class KnownNumber:
         if not isinstance(value, float | int):
             if not (isinstance(value, np.ndarray) and value.dtype == float):
                 return False
-            shapes = [(), (self.n,)][: 1 + (self.n > 0)]
-            if value.shape not in shapes or not np.isfinite(value).all():
+            each = self.n > 0 and value.shape == (self.n,)
+            if not (each or value.shape == ()) or not np.isfinite(value).all():
                 return False
             return all(bound.holds(value, bound.limit).all() for bound in self.bounds)
         if self.nonzero and value == 0.0:
