@@ -47,7 +47,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Sweep", "sweep"]
 
-AT_ONCE = 64  # maximum number of runs per task
+AT_ONCE = 256  # maximum number of runs per task
+WORKERS = 16  # assumed, where their number is not known
 
 
 @refusing()
@@ -138,8 +139,8 @@ def sweep(
             value=executor,
         )
     collected = Collected(what, runs, begin.counted, begin.settings.t_eval)
-    size = max(1, min(AT_ONCE, runs // AT_ONCE))
-    chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
+    quick = executor is None and begin.settings.engine == "compiled"
+    chunks = _chunks(runs, (os.cpu_count() or 1) if quick else WORKERS)
     # Dask treats tasks with equal arguments as one, and returns an earlier failure as their result.
     name = uuid.uuid4().hex
     with contextlib.ExitStack() as stack:
@@ -400,6 +401,17 @@ def _results(future: Future[RunResults], count: int) -> RunResults:
 
 
 # --------------------------------------------------------------------------- helpers
+def _chunks(runs: int, workers: int) -> list[range]:
+    """Return the runs of each task: ever fewer, so that no worker waits long for the last one."""
+    chunks: list[range] = []
+    start = 0
+    while start < runs:
+        size = max(1, min(AT_ONCE, max((runs - start) // (4 * workers), runs // 64)))
+        chunks.append(range(start, min(start + size, runs)))
+        start += size
+    return chunks
+
+
 def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count() or 1)
 
