@@ -160,13 +160,13 @@ class LiveView:
 
     def _summary(self, moment: Moment) -> str:
         """Return v, F and the states of each contact in one line."""
-        values, states, parts = moment.values, iter(moment.states), []
+        values, units, states, parts = moment.values, moment.units, iter(moment.states), []
         for lead in _leads(values):
             here = list(itertools.islice(states, len(values[f"{lead}z"])))
             text = (
                 f"{lead}{name} = "
-                + self.scale(lead + name, [values[lead + name]], unit).text(values[lead + name])
-                for name, unit in (("v", "m/s"), ("F", "N"))
+                + self.scale(lead + name, [values[lead + name]], units).text(values[lead + name])
+                for name in ("v", "F")
             )
             counts = (f"{here.count(name)} {name}" for name in dict.fromkeys(here))
             parts.append(", ".join([*text, *counts]))
@@ -199,9 +199,9 @@ class LiveView:
         seen = [moment.at(start + span * (i + 1) / wide).values for i in range(wide)]
         lines = []
         for lead in _leads(seen[-1]):
-            for name, unit in (("v", "m/s"), ("F", "N")):
+            for name in ("v", "F"):
                 values = [float(each[lead + name]) for each in seen]
-                scale = self.scale(lead + name, values, unit)
+                scale = self.scale(lead + name, values, moment.units)
                 low, high = scale.number(min(values)), scale.text(max(values))
                 text = f"{lead}{name} {sparkline(values)} {low} to {high}"
                 lines.append(Text(text, no_wrap=True))
@@ -213,27 +213,27 @@ class LiveView:
         states = zip(moment.states, moment.modes, strict=True)
         for name in _leads(values):
             here = list(itertools.islice(states, len(values[f"{name}z"])))
-            found.append(self.table(moment.t, here, values, name))
+            found.append(self.table(moment, here, values, name))
         return found
 
-    def scale(self, name: str, values: Iterable[float], unit: str) -> Scale:
+    def scale(self, name: str, values: Iterable[float], units: Mapping[str, str]) -> Scale:
         """Return how a quantity is written: in the unit that suits the largest value so far."""
         sizes = (abs(each) for each in values if math.isfinite(each))
         self.largest[name] = max(self.largest.get(name, 0.0), *sizes, 0.0)
-        return scale_of(self.largest[name], unit)
+        return scale_of(self.largest[name], units[name])
 
     def table(
-        self, t: float, states: Sequence[tuple[str, int]], seen: Mapping[str, Any], lead: str
+        self, at: Moment, states: Sequence[tuple[str, int]], seen: Mapping[str, Any], lead: str
     ) -> Table:
         """Return a table with one line per element: of each the state and its place."""
         values = {each: seen[lead + each] for each in ("v", "F", "z", "s")}
         scales = {
-            name: self.scale(lead + name, np.ravel(values[name]), unit)
-            for name, unit in (("v", "m/s"), ("F", "N"), ("z", "m"))
+            name: self.scale(lead + name, np.ravel(values[name]), at.units)
+            for name in ("v", "F", "z")
         }
         v, F = (scales[name].text(values[name]) for name in ("v", "F"))
         title = f"{lead.removesuffix('.')}   ".lstrip()
-        title += f"t = {self.time.text(t, 5):<9}   v = {v:<11}   F = {F}"
+        title += f"t = {self.time.text(at.t, 5):<9}   v = {v:<11}   F = {F}"
         bare = all(map(math.isnan, values["s"]))  # no threshold without a Stribeck curve
         still = all(map(math.isnan, values["z"]))  # a chart without variables
         table = Table("element", "state", title=title, title_justify="left", min_width=len(title))

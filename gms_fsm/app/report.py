@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gms_fsm.app.scenario import Loaded
-from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray
+from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, FloatArray, adapted
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.foundation.files import output_folder, refuse_input, write_text
-from gms_fsm.foundation.quantities import named_numbers
+from gms_fsm.foundation.quantities import named_numbers, per_second
 from gms_fsm.foundation.text import plain, table_lines
 from gms_fsm.lowering.scales import Setting
 from gms_fsm.records.motion import Motion
@@ -260,7 +260,7 @@ def summary_text(loaded: Loaded, trace: Trace, trust: Trust) -> str:
             f"- rig: {plain(trace.rig.title)}",
             f"- parameters: {_parameters(trace)}",
             f"- run: {settings}",
-            f"{result}, {_range(trace)} N",
+            f"{result}, {_range(trace)}",
             "",
             *_element_table(trace),
         ]
@@ -291,7 +291,11 @@ def _end_tables(trace: Trace, system: System) -> list[str]:
     """Return where the bodies and the further values are at the end of a run."""
     bodies = [(each.name, trace.body(each.name)) for each in system.bodies]
     rows = [
-        [f"{name} ({each.x}, {each.v})", f"{body.x[-1]:.6g}", f"{body.v[-1]:.6g}"]
+        [
+            f"{name} ({each.x}, {each.v})",
+            f"{body.x[-1]:.6g} {each.unit}",
+            f"{body.v[-1]:.6g} {per_second(each.unit)}",
+        ]
         for each, (name, body) in zip(system.bodies, bodies, strict=True)
     ]
     lines = [
@@ -323,7 +327,7 @@ def _contact_lines(trace: Trace) -> list[str]:
 
 def _range(trace: Trace) -> str:
     least, most = range_of_force(trace)
-    return f"F from {least:.4g} to {most:.4g}"
+    return f"F from {least:.4g} to {most:.4g} {trace.model.chart.force}"
 
 
 def _setting(value: Setting) -> str:
@@ -374,20 +378,21 @@ def trust_lines(trust: Trust, *, every: bool) -> list[str]:
 
 def _parameters(trace: Trace) -> str:
     model = trace.model
-    numbers = [(each, model.values[each.name]) for each in model.chart.parameters]
+    chart = model.chart
+    numbers = [(each, model.values[each.name]) for each in chart.parameters]
     if model.stribeck is not None:
         own = model.stribeck.numbers
-        per = {"N": "N per N of load"} if loaded(model) else {}
-        numbers += [
-            (replace(each, unit=per.get(each.unit, each.unit)), own[each.name])
-            for each in STRIBECK
-            if each.name in own
-        ]
+        numbers += [(each, own[each.name]) for each in STRIBECK if each.name in own]
     if not (isinstance(model, Contact) and model.model is None):
         numbers.append((SIGMA_2, model.sigma_2))
     if model.stribeck is not None:
         numbers.append((WEIGHTS, model.weights))
-    shown = (f"{each.name} = {_number(value)} {each.unit}".rstrip() for each, value in numbers)
+    per = {chart.force: f"{chart.force} per N of load"} if loaded(model) else {}
+    shown = []
+    for each, value in numbers:
+        unit = adapted(each, chart).unit
+        unit = per.get(unit, unit) if each in STRIBECK else unit
+        shown.append(f"{each.name} = {_number(value)} {unit}".rstrip())
     return ", ".join(shown)
 
 

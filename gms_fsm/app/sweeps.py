@@ -239,9 +239,12 @@ def sweep_summary(loaded: Loaded, axes: Sequence[Axis], result: Sweep, engine: s
     if loaded.system is None:
         ends = {"x [m]": result.x, "v [m/s]": result.v, "F [N]": result.F}
     else:
-        ends = {f"{each.name}.x": result.ends[f"{each.name}.x"] for each in loaded.system.bodies}
-        forces = (each.name for each in loaded.system.contacts)
-        ends |= {f"{name}.F": result.contact(name).F for name in forces}
+        ends = {
+            f"{each.name}.x [{each.unit}]": result.ends[f"{each.name}.x"]
+            for each in loaded.system.bodies
+        }
+        for each in loaded.system.contacts:
+            ends[f"{each.name}.F [{each.chart.force}]"] = result.contact(each.name).F
     heads += ["outcome", "transitions", "t [s]", *ends]
     rows = [
         [

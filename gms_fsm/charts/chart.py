@@ -6,8 +6,6 @@ from it. Building a chart checks it but never runs anything.
 
 from __future__ import annotations
 
-import keyword
-import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
@@ -15,10 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from gms_fsm.charts.nesting import Nesting, check_ends, check_paths, take_name
-from gms_fsm.charts.parameters import QUANTITIES, Parameter, check_rules
+from gms_fsm.charts.parameters import QUANTITIES, Parameter, adapted, check_rules
 from gms_fsm.charts.parts import (
+    SUPPLIED,
     State,
     Transition,
+    check_name,
     check_parts,
     event_name,
     parameter_of,
@@ -32,21 +32,13 @@ from gms_fsm.errors import ChartError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path, refusing
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.equality import by_value
-from gms_fsm.language import CONSTANTS, FUNCTIONS, MATLAB_LIKE, YIELDING, Condition, Value, spell
+from gms_fsm.language import MATLAB_LIKE, Condition, Value, spell
 from gms_fsm.language.normal import renamed_in
 
 if TYPE_CHECKING:
     from gms_fsm.charts.files.imported import GivenTexts
 
 __all__ = ["Chart", "State", "Transition"]
-
-SUPPLIED = ("t", "x", "v", "s")  # inputs that a model supplies to its chart
-# Names of the language and of the element objects; generated code gives way to a chart's names.
-RESERVED = frozenset(
-    {"F", "age", "after", "index", "machine", "pow", "state", "states", "trigger"}
-    | set(CONSTANTS)
-    | set(FUNCTIONS) - set(YIELDING)
-)
 
 
 @refusing(ChartError, instead={"edges": "transitions"})
@@ -141,6 +133,9 @@ class Chart:
     # As written; `states` and `transitions` are the innermost states and the edges between them.
     nesting: Nesting = field(init=False, repr=False)
     totals: Mapping[str, Value] = field(init=False, repr=False, compare=False)
+    # How its quantities are measured where a system uses it; nothing is computed from that.
+    rotary: bool = field(default=False, init=False, repr=False, compare=False)
+    units: tuple[tuple[str, str], ...] = field(default=(), init=False, repr=False, compare=False)
 
     def __init__(
         self,
@@ -216,7 +211,7 @@ class Chart:
             for i, name in enumerate(names):
                 key: tuple[str | int, ...] = (attribute, name) if kind == "let" else (attribute, i)
                 key = (*key, "name") if kind in ("state", "edge", "parameter") else key
-                _check_name(name, kind, here, key)
+                check_name(name, kind, here, key)
                 if name in SUPPLIED and kind != "input" and (name, kind) != ("s", "let"):
                     raise ChartError(
                         f"{kind} name {name!r} is taken",
@@ -226,7 +221,7 @@ class Chart:
                     )
                 take_name(name, owner, kind, here, key)
         for level in self.nesting.levels.values():
-            _check_name(level.state.name, "state", here, (*level.key, "name"))
+            check_name(level.state.name, "state", here, (*level.key, "name"))
         check_paths(self.nesting, owner, here)
         for name in sorted({*self.force_names} & owner.keys()):
             raise ChartError(f"{owner[name]} name {name!r} is taken by a force", place=here)
@@ -455,6 +450,16 @@ class Chart:
 
     # ------------------------------------------------------------------ queries
     @property
+    def length(self) -> str:
+        """Unit of its position: m, or rad where it turns; v has that per second."""
+        return "rad" if self.rotary else "m"
+
+    @property
+    def force(self) -> str:
+        """Unit of its force: N, or Nm where it turns."""
+        return "Nm" if self.rotary else "N"
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the constants, in order."""
         return tuple(each.name for each in self.parameters)
@@ -464,7 +469,8 @@ class Chart:
         """Parameters for its known names: inputs, parameters and the variable z."""
         own = {each.name: each for each in self.parameters}
         shared = self.inputs + self.variables
-        return {name: each for name, each in QUANTITIES.items() if name in shared} | own
+        known = {name: each for name, each in QUANTITIES.items() if name in shared} | own
+        return {name: adapted(each, self) for name, each in known.items()}
 
     def unit(self, name: str) -> str:
         """Return the unit of an input, a variable or a parameter.
@@ -472,7 +478,7 @@ class Chart:
         Parameters
         ----------
         name : str
-            A variable called z is a deflection [m].
+            A variable called z is a deflection [m], or an angle where the chart turns.
 
         Returns
         -------
@@ -569,28 +575,6 @@ class Chart:
                 advice=f"its edges are {', '.join(map(repr, self.guards)) or 'none'}",
             )
         return spell(renamed_in(self.guards[edge], called(self.durations)), MATLAB_LIKE)
-
-
-def _check_name(name: str, kind: str, here: str, key: tuple[str | int, ...]) -> None:
-    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-        raise ChartError(
-            f"{kind} name {name!r} is not a name",
-            place=here,
-            advice="use letters, digits and _, not starting with a digit, and no Python keyword",
-            key=key,
-        )
-    if unicodedata.normalize("NFKC", name) != name:
-        raise ChartError(
-            f"{kind} name {name!r} is not in Unicode normal form NFKC", place=here, key=key
-        )
-    if name in RESERVED or name.startswith(("_", "on_", "is_", "may_", "to_")):
-        raise ChartError(
-            f"{kind} name {name!r} is reserved",
-            place=here,
-            advice=f"not available are {_listed(sorted(RESERVED))}, and names that start "
-            "with _, on_, is_, may_ or to_",
-            key=key,
-        )
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -11,15 +11,20 @@ import functools
 import math
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from copy import copy
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.errors import ChartError, GMSError, ParameterError, shown
 from gms_fsm.foundation.arguments import refusing, unknown
-from gms_fsm.foundation.quantities import in_si
+from gms_fsm.foundation.equality import ByIdentity
+from gms_fsm.foundation.quantities import OF_A_ROTATION, in_si, of_rotation
+
+if TYPE_CHECKING:
+    from gms_fsm.charts.chart import Chart
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -211,6 +216,44 @@ def with_shared(own: Iterable[Parameter], *, curve: bool) -> tuple[Parameter, ..
     for each in (*own, *shared):
         found.setdefault(each.name, each)
     return tuple(found.values())
+
+
+# --------------------------------------------------------------------------- rotations
+def measured(chart: Chart, rotary: bool, units: tuple[tuple[str, str], ...] = ()) -> Chart:
+    """Return an equal chart as a contact of a system measures it: with F in Nm where it turns.
+
+    >>> from gms_fsm.charts import LUGRE
+    >>> turning = measured(LUGRE, True, (("sigma_1", "Nms"),))
+    >>> [turning.unit(name) for name in ("sigma_0", "sigma_1", "v", "z")], turning == LUGRE
+    (['Nm/rad', 'Nms', 'rad/s', 'rad'], True)
+    """
+    same = (chart.rotary, chart.units) == (rotary, units)
+    return chart if same else _measured(ByIdentity(chart), rotary, units)
+
+
+@functools.lru_cache(maxsize=256)  # caches know charts by identity: one for each use
+def _measured(chart: ByIdentity[Chart], rotary: bool, units: tuple[tuple[str, str], ...]) -> Chart:
+    other = copy(chart.it)
+    object.__setattr__(other, "rotary", rotary)
+    object.__setattr__(other, "units", units)
+    return other
+
+
+def adapted(parameter: Parameter, chart: Chart) -> Parameter:
+    """Return a parameter, of a chart or shared by models, with the unit in which it is measured.
+
+    That is the declared one; else, where the contact turns, one of rotations. A chart that writes
+    such units itself means what it writes; a normal force stays a force.
+    """
+    name, unit = parameter.name, parameter.unit
+    if (given := dict(chart.units).get(name)) is not None:
+        return replace(parameter, unit=given)
+    if not chart.rotary or (name, unit) == ("N", "N"):
+        return parameter
+    meant = name in chart.parameter_names and any(
+        OF_A_ROTATION.search(each.unit) for each in chart.parameters
+    )
+    return parameter if meant else replace(parameter, unit=of_rotation(unit))
 
 
 # --------------------------------------------------------------------------- checks

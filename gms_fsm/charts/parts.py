@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import keyword
+import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
@@ -12,11 +14,43 @@ from gms_fsm.charts.parameters import Parameter, checked_scalar
 from gms_fsm.errors import ChartError, ParameterError, shown
 from gms_fsm.foundation.arguments import refusing, unknown
 from gms_fsm.foundation.equality import by_value
-from gms_fsm.language import EVENT
+from gms_fsm.language import CONSTANTS, EVENT, FUNCTIONS, YIELDING
 
 DEEPEST_STATE = 8  # levels; deeper ones nobody could read
 MOST_PARTS = 5_000  # states and edges of a chart; more would take minutes to read and to compile
 NO_GUARD = "an event alone"  # what stands for a guard that is left out
+
+
+SUPPLIED = ("t", "x", "v", "s")  # inputs that a model supplies to its chart
+# Names of the language and of the element objects; generated code gives way to a chart's names.
+RESERVED = frozenset(
+    {"F", "age", "after", "index", "machine", "pow", "state", "states", "trigger"}
+    | set(CONSTANTS)
+    | set(FUNCTIONS) - set(YIELDING)
+)
+
+
+def check_name(name: str, kind: str, here: str, key: tuple[str | int, ...]) -> None:
+    """Refuse what cannot be the name of a part of a chart."""
+    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+        raise ChartError(
+            f"{kind} name {name!r} is not a name",
+            place=here,
+            advice="use letters, digits and _, not starting with a digit, and no Python keyword",
+            key=key,
+        )
+    if unicodedata.normalize("NFKC", name) != name:
+        raise ChartError(
+            f"{kind} name {name!r} is not in Unicode normal form NFKC", place=here, key=key
+        )
+    if name in RESERVED or name.startswith(("_", "on_", "is_", "may_", "to_")):
+        raise ChartError(
+            f"{kind} name {name!r} is reserved",
+            place=here,
+            advice=f"not available are {', '.join(map(repr, sorted(RESERVED)))}, and names that "
+            "start with _, on_, is_, may_ or to_",
+            key=key,
+        )
 
 
 def check_size(states: int, edges: int, place: str) -> None:

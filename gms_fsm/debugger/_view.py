@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.foundation.quantities import Scale, quantity, scale_of
+from gms_fsm.foundation.quantities import Scale, per_second, quantity, scale_of
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.session.elements import chart_of
 from gms_fsm.session.here import why_at
@@ -105,7 +105,7 @@ class ContactView:
         for name, values in zip(self.chart.variables, columns, strict=False):
             bounds = () if found else [each.s for each in self.elements if each.s is not None]
             found[name] = scale_of((*values, *bounds), self.chart.unit(name))
-        length = next(iter(found.values()), Scale(0, "m"))
+        length = next(iter(found.values()), Scale(0, self.chart.length))
         return found | {"s": length, "F": self.here.scales["F"]}
 
 
@@ -134,7 +134,7 @@ class BodyView:
     def text(self) -> str:
         """Return name and value of position and velocity, with units."""
         (x, position), (v, velocity) = self.x, self.v
-        speed = quantity(velocity, f"{self.unit}/s")
+        speed = quantity(velocity, per_second(self.unit))
         return f"{x} = {quantity(position, self.unit)}, {v} = {speed}"
 
 

@@ -13,7 +13,6 @@ from gms_fsm.verification.sameness.same import Verdict
 
 WIDTH = 80  # characters of a line
 MOST_NAMED = 4  # quantities in a sentence
-UNITS = {"x": "m", "v": "m/s", "F": "N", "z": "m"}  # of what is compared of two runs
 ChangeKind: TypeAlias = Literal["added", "removed", "renamed", "changed"]
 SIGNS: Mapping[ChangeKind, str] = {"added": "+", "removed": "-", "renamed": "=", "changed": "~"}
 
@@ -84,6 +83,8 @@ class RunsDiff:
         The quantities that differ by more than the tolerances explain.
     compared : int
         How many quantities were compared, the states of each contact as one.
+    units : mapping of str to str
+        Of the quantities, as far as they are known.
     """
 
     about: str
@@ -98,6 +99,7 @@ class RunsDiff:
     motion: str = ""
     beyond: tuple[str, ...] = ()
     compared: int = 0
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def headline(self) -> str:
@@ -122,9 +124,9 @@ class RunsDiff:
             lines += [f"  first:  {self.fired[0]}", f"  second: {self.fired[1]}"]
         until = self.t_end if self.t is None else self.t
         values = ", ".join(
-            f"{name} {in_words(each, UNITS.get(name.rsplit('.', 1)[-1], ''), 3)}"
+            f"{name} {in_words(each, self.units.get(name, ''), 3)}"
             for name, each in self.largest.items()
-            if name in self.beyond or (each > 0.0 and name.rsplit(".", 1)[-1] in UNITS)
+            if name in self.beyond or (each > 0.0 and name in self.units)
         )
         none = f"none in {self.compared} quantities" if self.compared else "nothing compared"
         lines.append(f"  largest difference until t = {until:.9g} s: {values or none}")

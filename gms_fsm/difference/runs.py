@@ -11,6 +11,7 @@ import numpy as np
 from gms_fsm.difference.result import PartChange, RunsDiff
 from gms_fsm.difference.wording import both
 from gms_fsm.session.results import SAMPLES, first_unlike
+from gms_fsm.traces.system_scope import units_of
 from gms_fsm.traces.trace import Trace
 
 SLACK = 100.0  # times the relative tolerance, of what runs computed differently may differ by
@@ -123,6 +124,7 @@ def runs_diff(
         number is not None or bool(found.beyond),
         beyond=tuple(found.beyond),
         compared=found.count,
+        units=units_of(a.what, found.largest),
     )
 
 

@@ -7,9 +7,17 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from gms_fsm.charts.parameters import QUANTITIES, SIGMA_2, STRIBECK, WEIGHTS, Parameter
+from gms_fsm.charts.parameters import (
+    QUANTITIES,
+    SIGMA_2,
+    STRIBECK,
+    WEIGHTS,
+    Parameter,
+    adapted,
+)
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
+from gms_fsm.foundation.quantities import per_second
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import EVENT
 from gms_fsm.run.problem import Problem
@@ -157,27 +165,26 @@ def _declared(system: System, label: str) -> Parameter:
     known: dict[str, Parameter] = {}
     if contact is not None:
         known = dict(_of_contact(contact))
-    elif name in {body.x for body in system.bodies}:
-        known = {name: Parameter(name, "m", meaning="position")}
-    elif name in {body.v for body in system.bodies}:
-        known = {name: Parameter(name, "m/s", meaning="velocity")}
     elif name.startswith(EVENT):
         known = {name: Parameter(name, meaning="event, 1 where it has come")}
-    return known.get(name, Parameter(re.sub(r"\W", "_", name)))
+    else:
+        for body in system.bodies:
+            position = Parameter(body.x, body.unit, meaning="position")
+            speed = Parameter(body.v, per_second(body.unit), meaning="velocity")
+            known |= {body.x: position, body.v: speed}
+    return known.get(name, Parameter(re.sub(r"\W", "_", name), system.units.get(name, "")))
 
 
 def _of_contact(contact: Contact) -> Iterator[tuple[str, Parameter]]:
     chart = contact.chart
-    units = {**QUANTITIES, **chart.declared}
-    yield from units.items()
-    yield "F_elements", Parameter("F_elements", "N", meaning="forces of the elements")
+    forces = Parameter("F_elements", "N", meaning="forces of the elements")
+    known = {**QUANTITIES, "F_elements": forces, WEIGHT: WEIGHTS, f"{MODEL}sigma_2": SIGMA_2}
+    known |= {f"{CURVE}{each.name}": each for each in STRIBECK}
+    yield from ((name, adapted(each, chart)) for name, each in known.items())
+    yield from chart.declared.items()
     for name in chart.variables:
-        unit = chart.unit(name)
-        rate = "m/s" if unit == "m" else f"({unit})/s" if unit else ""
+        rate = per_second(chart.unit(name))
         yield f"d{name}", Parameter(f"d{name}", rate, meaning=f"derivative of {name}")
-    yield from ((f"{CURVE}{each.name}", each) for each in STRIBECK)
-    yield f"{MODEL}sigma_2", SIGMA_2
-    yield WEIGHT, WEIGHTS
 
 
 def _plain(label: str, alone: bool) -> str:

@@ -13,14 +13,32 @@ from gms_fsm.errors import UnitError, shown
 WIDTH = 80  # columns, where there is no terminal
 JOINED = "\N{NO-BREAK SPACE}"
 NAME_AND_NUMBER = re.compile(r"[^ ]+ = -?\d[^ ]*")
-NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=[pnuµmkMGT]?(?:m/s|m|N|s)\b)")
+NUMBER_AND_UNIT = re.compile(r"(?<=\d) (?=[pnuµmkMGT]?(?:m/s|rad/s|rad|Nm|m|N|s)\b)")
 
 PREFIXES = {3 * i - 12: prefix for i, prefix in enumerate([*"pnµm", "", *"kMGT"])}
 # A prefix belongs to the first unit of a product; of a power or of kg it would be wrong.
-TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns)(?=$|[/*·])")
+TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz|rad|V|A|Nm|Ns|Nms)(?=$|[/*·])")
 LONGEST_NUMBER = 60  # characters, with its unit: the search takes quadratic time
 # Factors to SI.
-NOT_OF_SI = {"g": 1e-3, "min": 60.0, "h": 3600.0, "%": 0.01, "in": 0.0254, "lbf": 4.4482216152605}
+NOT_OF_SI = {
+    **{"g": 1e-3, "min": 60.0, "h": 3600.0, "%": 0.01, "in": 0.0254, "lbf": 4.4482216152605},
+    **{"deg": math.pi / 180.0, "rpm": math.pi / 30.0},
+}
+# What a unit of a translation is for a rotation, unit by unit.
+OF_ROTATION = {"m": "rad", "N": "Nm", "Ns": "Nms", "kg": "kg m^2"}
+OF_A_ROTATION = re.compile(r"\brad\b|\bNm(s|\b)")
+# The exponents of the base units in a unit.
+BASES: Mapping[str, Mapping[str, int]] = {
+    "1": {},
+    **{base: {base: 1} for base in ("m", "kg", "s", "A", "K", "rad")},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "Hz": {"s": -1},
+}
+_BASE = re.compile(rf"({'|'.join(sorted(BASES, key=len, reverse=True))})(?:(?:\^|\*\*)?(-?\d))?")
 _ONE_UNIT = re.compile(r"([pnuµmckMGT]?)(Nm|Ns|Pa|Hz|rad|m|s|N|J|W|V|A|g)\^?(-?\d)?")
 _POWER_OF_TEN = re.compile(r"(?:([\d.,]+)\s*[*x×·]\s*)?\b10\s*(?:\^|\*\*)\s*\(?([+-]?\d+)\)?")
 _WITH_UNIT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
@@ -172,8 +190,87 @@ UNITS = {
         "velocity": "m/s cm/s mm/s um/s nm/s",
         "force": "N kN mN uN lbf",
         "normal": "N kN mN uN lbf",
+        "angle": "rad mrad urad nrad deg",
+        "angular velocity": "rad/s mrad/s urad/s nrad/s deg/s rpm",
+        "torque": "Nm kNm mNm uNm",
     }.items()
 }
+
+
+def of_rotation(unit: str) -> str:
+    """Return the unit of a rotation that stands for one of a translation.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit, for example ``"Ns/m"``.
+
+    Returns
+    -------
+    str
+        The same with torques and angles; one that has them already is as it was.
+
+    Examples
+    --------
+    >>> [of_rotation(unit) for unit in ("m/s", "Ns/m", "m/N", "kg", "1", "s/rad")]
+    ['rad/s', 'Nms/rad', 'rad/Nm', 'kg m^2', '1', 's/rad']
+    """
+    return re.sub(r"[^\W\d]+", lambda found: OF_ROTATION.get(found[0], found[0]), unit)
+
+
+def base_units(text: str) -> dict[str, int] | None:
+    """Return the exponents of the SI base units in a unit; None if it is not known.
+
+    Parameters
+    ----------
+    text : str
+        Unit, for example ``"Ns/m"``.
+
+    Returns
+    -------
+    dict of str to int, or None
+        Without those that are 0.
+
+    Examples
+    --------
+    >>> base_units("Ns/m")
+    {'kg': 1, 's': -1}
+    >>> base_units("m/s^2"), base_units("1"), base_units("furlong")
+    ({'m': 1, 's': -2}, {}, None)
+    """
+    found: dict[str, int] = {}
+    for k, part in enumerate(re.sub(r"[()]", "", text).split("/")):
+        rest = re.sub(r"[\s*·]+(?!\*)", "", part) if "**" not in part else part
+        if not rest:
+            return None
+        while rest:
+            token = _BASE.match(rest)
+            if token is None:
+                return None
+            power = int(token[2] or 1) * (-1 if k else 1)
+            for name, exponent in BASES[token[1]].items():
+                found[name] = found.get(name, 0) + power * exponent
+            rest = rest[token.end() :]
+    return {name: exponent for name, exponent in found.items() if exponent}
+
+
+def si_unit(text: str) -> bool:
+    """Return whether a text is a unit of SI without a prefix.
+
+    >>> [each for each in ("m/rad", "Nms/rad", "kg m^2", "mm", "deg", "") if si_unit(each)]
+    ['m/rad', 'Nms/rad', 'kg m^2']
+    """
+    size = _size(text)
+    return base_units(text) is not None and (math.isnan(size) or size == 1.0)
+
+
+def per_second(unit: str) -> str:
+    """Return the unit of a rate; empty if that of the quantity is.
+
+    >>> [per_second(unit) for unit in ("m", "rad/s", "N/m", "")]
+    ['m/s', 'rad/s^2', 'N/m/s', '']
+    """
+    return f"{unit}^2" if unit.endswith("/s") else f"{unit}/s" if unit else ""
 
 
 def plain(unit: str) -> str:

@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from gms_fsm.charts.chart import SUPPLIED, Chart, State, Transition
+from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import Parameter
+from gms_fsm.charts.parts import SUPPLIED
 from gms_fsm.language import names_in
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import simulate

@@ -14,11 +14,11 @@ from gms_fsm.errors import SessionError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.foundation.quantities import Scale, in_words, trimmed
+from gms_fsm.traces.system_scope import units_of
 from gms_fsm.traces.trace import Trace
 
 SAMPLES = 2000  # number of common times at which two branches are compared
 Part = TypeVar("Part")
-UNITS = {"z": "m", "F": "N"}  # of what is compared
 MANY = 4  # contacts; with more, a row prints only those that fired
 
 
@@ -261,6 +261,7 @@ class BranchComparison:
     transitions: tuple[int, int]
     first_difference: float | None
     differences: Mapping[str, float]
+    units: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @property
     def z(self) -> float:
@@ -275,7 +276,7 @@ class BranchComparison:
     def __str__(self) -> str:
         (a, b), (p, q) = self.branches, self.transitions
         largest = ", ".join(
-            f"{name} {in_words(value, UNITS.get(name.rsplit('.', 1)[-1], ''), 3)}"
+            f"{name} {in_words(value, self.units.get(name, ''), 3)}"
             for name, value in self.differences.items()
         )
         return (
@@ -303,7 +304,8 @@ def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> BranchCom
     differences = {
         name: float(np.abs(column - columns[1][name]).max()) for name, column in columns[0].items()
     }
-    return BranchComparison(numbers, t, (len(logs[0]), len(logs[1])), differs, differences)
+    counts, units = (len(logs[0]), len(logs[1])), units_of(first.what, differences)
+    return BranchComparison(numbers, t, counts, differs, differences, units)
 
 
 def first_unlike(

@@ -5,8 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
-from gms_fsm.charts.chart import SUPPLIED, Chart
+from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import Parameter, checked_values
+from gms_fsm.charts.parts import SUPPLIED
 from gms_fsm.charts.registry import registered
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import GMSError

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm.charts.chart import SUPPLIED, Chart
+from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.gms import GIVE_LAW, GMS_ELEMENT, Law, check_law
 from gms_fsm.charts.parameters import (
     SIGMA_2,
@@ -21,6 +21,7 @@ from gms_fsm.charts.parameters import (
     WEIGHTS,
     FloatArray,
     Parameter,
+    adapted,
     as_numbers,
     check_names,
     checked_array,
@@ -28,6 +29,7 @@ from gms_fsm.charts.parameters import (
     checked_values,
     with_shared,
 )
+from gms_fsm.charts.parts import SUPPLIED
 from gms_fsm.charts.registry import Entry
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.charts.zoo.bristles.lugre import LUGRE
@@ -403,7 +405,7 @@ def parameters_of(model: Model) -> tuple[Parameter, ...]:
     """
     every = with_shared(model.chart.parameters, curve=model.stribeck is not None)
     fixed = isinstance(model, LuGre)  # its bristle uses the curve unweighted
-    return tuple(each for each in every if not (fixed and each == WEIGHTS))
+    return tuple(adapted(each, model.chart) for each in every if not (fixed and each == WEIGHTS))
 
 
 def parameter_names(model: Model) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.gms import GMS_ELEMENT
-from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter
+from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter, adapted
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import one_of, unknown
 from gms_fsm.systems.gms_parameters import GMSParameters
@@ -73,7 +73,11 @@ def known_in(what: Mounted) -> dict[str, tuple[Parameter, int]]:
     """
     units = {each.name: each for each in getattr(what.rig, "parameters", ())}
     rest = {
-        what.of(NUMBERS, name): (units.get(name, Parameter(name)), 0) for name in what.rig.numbers
+        what.of(NUMBERS, name): (
+            units.get(name, Parameter(name, what.system.units.get(name, ""))),
+            0,
+        )
+        for name in what.rig.numbers
     }
     found = dict(rest) if what.named else {}
     for contact in what.system.machines:
@@ -150,7 +154,8 @@ def _owner(what: Mounted, name: str) -> tuple[str, str]:
 def _known(contact: Contact) -> dict[str, tuple[Parameter, int]]:
     """Return the parameters of a contact, as `known_in`."""
     model, found = contact.model, dict[str, tuple[Parameter, int]]()
-    for own in contact.chart.parameters if model is None else parameters_of(model):
+    every = contact.chart.parameters if model is None else parameters_of(model)
+    for own in (adapted(each, contact.chart) for each in every):
         wide = own.name == WEIGHTS.name or np.ndim(contact.values.get(own.name, 0.0)) > 0
         found.setdefault(own.name, (own, contact.n if wide else 0))
     return found

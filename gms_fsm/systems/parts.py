@@ -14,7 +14,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, cut, shown
-from gms_fsm.foundation.arguments import one_of, refusing
+from gms_fsm.foundation.arguments import checked_kind, one_of, refusing
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.given import (
@@ -48,22 +48,26 @@ class Body:
     name : str
         Unique in its system.
     inertia : str or float
-        kg (or kg m^2, with angles); None for a body whose velocity is given.
+        kg, or kg m^2 of one that turns; None for a body whose velocity is given.
     force : str or float
-        N, over ``t``, the names of bodies, further states, signals and numbers.
+        N, or Nm, over ``t``, the names of bodies, further states, signals and numbers.
     velocity : str or float, optional
-        m/s, over ``t``, signals and numbers: the body moves like this whatever acts on it.
+        m/s, or rad/s, over ``t``, signals and numbers: the body moves like this whatever acts on
+        it.
     x, v : str
         What its position and its velocity are called in texts.
     motion : {"along", "normal", "turning"}
-        How pictures show it: along the surface that it rubs on, normal to it, or turning, with
-        its position in rad. Equations do not depend on it.
+        How pictures show it: along the surface that it rubs on, normal to it, or turning, which
+        is the same as ``rotary=True``.
+    rotary : bool
+        Whether it turns: its position is in rad, and contacts that move by it give a torque, Nm.
+        Equations do not depend on it.
 
     Examples
     --------
     >>> Body("load", inertia=1.0, force="K * (x_m - x_l)", x="x_l", v="v_l").v
     'v_l'
-    >>> Body("rotor", inertia=1e-3, x="phi", v="w", motion="turning").unit
+    >>> Body("rotor", inertia=1e-3, x="phi", v="w", rotary=True).unit
     'rad'
     """
 
@@ -74,6 +78,7 @@ class Body:
     x: str = field(default="x", kw_only=True)
     v: str = field(default="v", kw_only=True)
     motion: Motion = field(default="along", kw_only=True)
+    rotary: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         here = f"body {shown(self.name)}"
@@ -86,6 +91,16 @@ class Body:
                 advice="give inertia=... to a free body, velocity=... to a driven one",
             )
         one_of(f"{here}: motion", self.motion, get_args(Motion))
+        if checked_kind(f"{here}: rotary", self.rotary, bool, "True or False"):
+            if self.motion == "normal":
+                raise ParameterError(
+                    "what turns does not move normal to a surface",
+                    place=f"{here}: motion",
+                    value=self.motion,
+                    advice="leave out motion=..., or rotary=True",
+                )
+            object.__setattr__(self, "motion", "turning")
+        object.__setattr__(self, "rotary", self.motion == "turning")
         for each in ("inertia", "force", "velocity"):
             if (text := getattr(self, each)) is not None:
                 check_text(text, f"{here}: {each}")
@@ -100,7 +115,7 @@ class Body:
     @property
     def unit(self) -> str:
         """Unit of its position."""
-        return "rad" if self.motion == "turning" else "m"
+        return "rad" if self.rotary else "m"
 
 
 @refusing()
@@ -111,7 +126,8 @@ class Contact:
     """Machines of one chart on one relative velocity.
 
     The contact takes its force F from each body, times that body's coefficient in `v`: its power is
-    F v, whatever the gearing.
+    F v, whatever the gearing. Where v is that of a rotation it is in rad/s, F is a torque in Nm,
+    and the units of the chart's numbers adapt.
 
     Parameters
     ----------
@@ -254,7 +270,7 @@ class Contact:
 
     @property
     def weights(self) -> FloatArray:
-        """Threshold weights, shape (n,), m/N."""
+        """Threshold weights, shape (n,), m/N, or rad/Nm."""
         return np.ones(self.n) if self.model is None else self.model.weights
 
     @property
@@ -271,7 +287,7 @@ class Contact:
 
     @property
     def sigma_2(self) -> float:
-        """Viscous friction of its model, Ns/m."""
+        """Viscous friction of its model, Ns/m, or Nms/rad."""
         return 0.0 if self.model is None else self.model.sigma_2
 
 

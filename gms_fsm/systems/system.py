@@ -50,6 +50,7 @@ from gms_fsm.systems.parts import (
     Supervisor,
     loaded,
 )
+from gms_fsm.systems.reading.kinds import checked_units, in_their_units
 from gms_fsm.systems.reading.texts import texts_of_system
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import Signal, as_signal
@@ -105,6 +106,9 @@ class System:
     let : mapping of str to str, optional
         Named expressions of the above, for all texts but those of signals and given velocities;
         later ones can use earlier ones.
+    units : mapping of str to str, optional
+        Units of SI of numbers, signals, further states, and of what a contact has: ``{"r":
+        "m/rad", "rock.W": "N"}``. What is not declared adapts to the motion of the bodies.
 
     Raises
     ------
@@ -142,6 +146,7 @@ class System:
     flow: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     sampled: tuple[Sampled, ...] = field(default=(), kw_only=True)
     let: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    units: Mapping[str, str] = field(default_factory=dict, kw_only=True)
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
@@ -175,6 +180,9 @@ class System:
         self._check_names(here)
         signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
         put(self, "signals", signals)
+        put(self, "units", checked_units(self, here))
+        put(self, "contacts", in_their_units(self.contacts, self, here))
+        put(self, "supervisors", in_their_units(self.supervisors, self, here))
         self._read()
 
     def __repr__(self) -> str:
@@ -281,12 +289,12 @@ class System:
         Parameters
         ----------
         path : str or Path
-            With the keys ``name``, ``[[body]]`` (name, inertia, force, velocity, x, v, motion),
-            ``[[spring]]`` (name, first, second, k, d, ratio, rest), ``[[contact]]`` (name, v, n,
-            inputs, period; ``chart``, a chart file next to this file, the name of an included
+            With the keys ``name``, ``[[body]]`` (name, inertia, force, velocity, x, v, rotary,
+            motion), ``[[spring]]`` (name, first, second, k, d, ratio, rest), ``[[contact]]`` (name,
+            v, n, inputs, period; ``chart``, a chart file next to this file, the name of an included
             chart, or a table as in a chart file, with ``values``; or ``model``, as in scenario
-            files), ``[signals]``, ``[numbers]``, ``[flow]``, ``[let]`` and ``[[sampled]]`` (name,
-            period, updates, initial, offset).
+            files), ``[signals]``, ``[numbers]``, ``[flow]``, ``[let]``, ``[units]`` and
+            ``[[sampled]]`` (name, period, updates, initial, offset).
 
         Returns
         -------

@@ -24,6 +24,7 @@ import numpy as np
 from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.reader import called
 from gms_fsm.errors import SignalError
+from gms_fsm.foundation.quantities import per_second
 from gms_fsm.language import MATLAB_LIKE, Condition, names_in, spell
 from gms_fsm.language.normal import renamed_in
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
@@ -59,8 +60,10 @@ def unit_of(chart: Chart, name: str) -> str:
     """Return the unit of a name in guards; empty if it is unknown."""
     known = {"t": "s", "age": "s"} | dict.fromkeys(chart.durations, "s")
     if chart.velocities:
-        known |= dict.fromkeys(chart.force_names, "N") | dict.fromkeys(chart.rate_names, "m/s^2")
-        known |= dict.fromkeys(chart.velocities, "m/s") | {"x": "m"}
+        speed = per_second(chart.length)
+        known |= dict.fromkeys(chart.force_names, chart.force) | {"x": chart.length}
+        known |= dict.fromkeys(chart.velocities, speed)
+        known |= dict.fromkeys(chart.rate_names, per_second(speed))
     return chart.unit(name) or known.get(name, "")
 
 

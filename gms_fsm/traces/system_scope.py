@@ -18,7 +18,7 @@ import numpy as np
 
 from gms_fsm.errors import SignalError, UnitError, shown
 from gms_fsm.foundation.arguments import checked_kind
-from gms_fsm.foundation.quantities import UNITS, convert_numbers, factor
+from gms_fsm.foundation.quantities import UNITS, convert_numbers, factor, per_second
 from gms_fsm.foundation.quantities import in_si as number_in_si
 from gms_fsm.language import Name, Owner, evaluate, names_in, values_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
@@ -201,7 +201,7 @@ def names_of(what: Mounted) -> list[str]:
 
 
 def units_of(what: Mounted, names: Iterable[str] = ()) -> dict[str, str]:
-    """Return the units of names, as far as they are known: those of bodies are not declared.
+    """Return the units of names, as far as they are known.
 
     Without names, of those in conditions and watches.
     """
@@ -216,6 +216,12 @@ def units_of(what: Mounted, names: Iterable[str] = ()) -> dict[str, str]:
             bare = re.sub(r"\d+$", "", last)
             if unit := unit_of(chart, last) or unit_of(chart, bare):
                 found[name] = unit
+    if what.named:
+        known = dict(what.system.units)
+        for body in what.system.bodies:
+            known |= dict.fromkeys((body.x, f"{body.name}.x"), body.unit)
+            known |= dict.fromkeys((body.v, f"{body.name}.v"), per_second(body.unit))
+        found |= {name: known[name] for name in every if name in known}
     return found | {"t": "s"}
 
 

@@ -13,7 +13,7 @@ from scipy.integrate import Radau
 from gms_fsm import Prescribed
 from gms_fsm.app._tables import Scenario, SystemScenario
 from gms_fsm.app.scenario import load_scenario
-from gms_fsm.charts.chart import SUPPLIED
+from gms_fsm.charts.parts import SUPPLIED
 from gms_fsm.charts.registry import registered
 from gms_fsm.systems.signals import Corners, Formula
 from tests.scenario_files import (

@@ -77,7 +77,7 @@ def test_what_no_file_can_store_is_refused(tmp_path: Path) -> None:
 def test_charts_are_shown_and_compared_by_what_their_authors_wrote() -> None:
     derived = {each.name for each in fields(Chart) if not each.init}
     read = {"guards", "flows", "assignments", "forces", "lets", "totals"}
-    assert derived == read | {"hidden", "nesting", "durations"}
+    assert derived == read | {"hidden", "nesting", "durations", "rotary", "units"}
     assert [each.name for each in fields(Chart) if each.repr != each.init] == []
     # Charts that only look different are equal; those that are the same but for outer states not.
     compared = [each.name for each in fields(Chart) if each.compare != each.init]

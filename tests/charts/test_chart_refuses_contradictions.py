@@ -11,7 +11,7 @@ import dataclasses
 
 import pytest
 
-from gms_fsm.charts.chart import RESERVED, State
+from gms_fsm.charts.parts import RESERVED, State
 from gms_fsm.errors import ChartError
 from gms_fsm.language import CONSTANTS, FUNCTIONS, YIELDING, spell
 from tests.refusals import BACK, GO, SLIP, STICK, chart, edge

@@ -12,7 +12,7 @@ import pytest
 
 from gms_fsm import GMS, ElementMachines, GMSParameters, ParameterError, Prescribed, Stribeck
 from gms_fsm.charts import GMS_ELEMENT, LAWS, SLIP_LAWS, gms_element
-from gms_fsm.charts.chart import SUPPLIED
+from gms_fsm.charts.parts import SUPPLIED
 from gms_fsm.language import evaluate, names_in
 from gms_fsm.lowering.program import lower
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import ChartModel, Model, Prescribed, System, export, simulate
-from gms_fsm.exporters.fmi.units import base_units
+from gms_fsm.foundation.quantities import base_units
 from tests.exporters.frictions import reads_acceleration, servo
 from tests.helpers import stick_slip
 from tests.supervisor_cases import crossing

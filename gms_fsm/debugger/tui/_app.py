@@ -282,7 +282,7 @@ class FullScreen(App[int]):
         title = f"states over time{whose}: {'  '.join(self._key())}"
         if not self.small:
             values = curves(session, element, parts, span)
-            panel.border_subtitle = _time.ranges(values)
+            panel.border_subtitle = _time.ranges(values, session.system.contact(bank.name).chart)
             rows = _time.curve_rows(values, lead, shown.now) + rows
         axis = " " * lead + _time.axis(*span, parts)
         panel.lead, panel.span, panel.parts = lead, span, parts

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from gms_fsm.charts.chart import Chart
 from gms_fsm.debugger._over_time import Ribbons
 from gms_fsm.debugger._text import DRAWN, labels, short
 from gms_fsm.debugger._view import Screen
 from gms_fsm.debugger.tui._spans import Line, PanelLine, Span, line, state_role
 from gms_fsm.foundation.quantities import scale_of, sparkline
-
-UNITS = {"v": "m/s", "F": "N"}
+from gms_fsm.traces.scope import unit_of
 
 
 def axis(start: float, end: float, width: int) -> str:
@@ -76,17 +76,18 @@ def _joined(spans: Sequence[Span]) -> Line:
     return found
 
 
-def ranges(values: Mapping[str, Sequence[float | None]]) -> str:
+def ranges(values: Mapping[str, Sequence[float | None]], chart: Chart) -> str:
     """Return the ranges of velocity and force.
 
-    >>> ranges({"v": (0.0, None, 0.15), "F": (1.0, 2.0)})
+    >>> from gms_fsm.charts import LUGRE
+    >>> ranges({"v": (0.0, None, 0.15), "F": (1.0, 2.0)}, LUGRE)
     'v 0 to 150.0 mm/s  F 1.000 to 2.000 N'
     """
     found = []
     for name, each in values.items():
         known = [value for value in each if value is not None and math.isfinite(value)]
         if known:
-            scale = scale_of(known, UNITS[name])
+            scale = scale_of(known, unit_of(chart, name))
             low, high = scale.number(min(known)), scale.text(max(known))
             found.append(f"{name} {low} to {high}")
     return "  ".join(found)

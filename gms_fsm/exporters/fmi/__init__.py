@@ -1,1 +1,1 @@
-"""The parts of an FMU: archive, C sources, units, variables."""
+"""The parts of an FMU: archive, C sources, variables."""

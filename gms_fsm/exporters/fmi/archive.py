@@ -25,8 +25,8 @@ from gms_fsm.exporters._adapting import check_first_call
 from gms_fsm.exporters._c import WORDS, filled
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.fmi.model import FmuModel
-from gms_fsm.exporters.fmi.units import base_units
 from gms_fsm.exporters.fmi.variables import FmuVariable, types_of, variables_of
+from gms_fsm.foundation.quantities import base_units
 from gms_fsm.foundation.text import encoded, visible
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")

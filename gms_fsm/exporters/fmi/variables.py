@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from gms_fsm.exporters._c import WORDS
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
+from gms_fsm.foundation.quantities import per_second
 from gms_fsm.language import Binary, comparisons, names_in, split
 from gms_fsm.lowering.adapting import SHARE
 from gms_fsm.lowering.printing.plan import plan_of
@@ -102,8 +103,8 @@ def variables_of(subject: Subject, *, exchange: bool) -> tuple[FmuVariable, ...]
     first = 1 + len(subject.inputs)
     for k, each in enumerate(states, first):
         if each.continuous_state:
-            rate = {"m": "m/s", "m/s": "m/s2", "": ""}.get(each.unit, f"{each.unit}/s")
-            found.append(FmuVariable(f"der({each.name})", "SLOPES", each.index, unit=rate, of=k))
+            unit = per_second(each.unit)
+            found.append(FmuVariable(f"der({each.name})", "SLOPES", each.index, unit=unit, of=k))
     found.append(
         FmuVariable(
             "switches",
@@ -133,6 +134,7 @@ def types_of(start: Problem) -> dict[str, tuple[str, ...]]:
 
 def _inputs(subject: Subject) -> Iterator[FmuVariable]:
     tables = subject.start.program.p[2]
+    speed = per_second(subject.start.system.machines[0].chart.length)
     for k, name in enumerate(subject.inputs):
         velocity = subject.alone and name == "v"
         first, *_ = tables[2 * k + 1]
@@ -143,7 +145,7 @@ def _inputs(subject: Subject) -> Iterator[FmuVariable]:
             causality="input",
             initial="exact",
             start=first,
-            unit="m/s" if velocity else "",
+            unit=speed if velocity else "",
             meaning="velocity" if velocity else "",
         )
 

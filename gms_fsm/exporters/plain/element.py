@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import cast
 
 from gms_fsm.charts.nesting import spelled
-from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
+from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter, adapted
 from gms_fsm.charts.reader import called
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
@@ -352,7 +352,11 @@ class PlanReader:
 
     def about(self, short: str) -> str:
         declared = self.bank.chart.declared.get(short)
-        return "" if declared is None else _about(declared)
+        return "" if declared is None else self.described(declared)
+
+    def described(self, parameter: Parameter) -> str:
+        known = adapted(parameter, self.bank.chart)
+        return visible(": ".join(part for part in (known.unit, known.meaning) if part))
 
     @functools.cached_property
     def moved(self) -> frozenset[str]:
@@ -412,7 +416,7 @@ class PlanReader:
             if each.tree is not None:
                 short = self.names[each.name]
                 inside = each.name.removeprefix(f"{self.bank.name}.")
-                about = _about(MODEL[inside][1]) if inside in MODEL else self.about(short)
+                about = self.described(MODEL[inside][1]) if inside in MODEL else self.about(short)
                 value = self.expression(each.tree, self.plan.definitions[each.name])
                 yield Let(short, value, each.bank is not None, each.name in self.moved, about)
 
@@ -424,7 +428,9 @@ class PlanReader:
             if name in self.names:
                 inside = name.removeprefix(f"{self.bank.name}.")
                 about = (
-                    _about(MODEL[inside][1]) if inside in MODEL else self.about(self.names[name])
+                    self.described(MODEL[inside][1])
+                    if inside in MODEL
+                    else self.about(self.names[name])
                 )
                 yield Constant(self.names[name], value, about)
 
@@ -483,7 +489,3 @@ class PlanReader:
         values = tuple(float(start.y[layout.y.index(name, i)]) for i in range(self.bank.n))
         about = "s: time in the present state" if short == "age" else self.about(short)
         return Variable(short, self.names[self.bank.rate(name)], values, about)
-
-
-def _about(parameter: Parameter) -> str:
-    return visible(": ".join(part for part in (parameter.unit, parameter.meaning) if part))

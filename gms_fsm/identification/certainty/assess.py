@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gms_fsm.charts.parameters import QUANTITIES, WEIGHTS, FloatArray
+from gms_fsm.charts.parameters import WEIGHTS, FloatArray
 from gms_fsm.identification.certainty.profile import Profile, shown_interval
 from gms_fsm.identification.certainty.region import Region, walked
 from gms_fsm.identification.certainty.statistics import (
@@ -453,7 +453,7 @@ def sorted_elements(
     whole = [key for key, n in wide.items() if sum(each.key == key for each in own) == n]
     if len(own) != sum(wide[key] for key in whole) or {each.name for each in own} & {*bounded}:
         return subject
-    lengths = [key for key in wide if known_in(subject)[key][0].unit == QUANTITIES["z"].unit]
+    lengths = [key for key in wide if known_in(subject)[key][0].unit in ("m", "rad")]
     by = [key for key in (WEIGHTS.name, *lengths) if key in whole]
     if not by:
         return subject

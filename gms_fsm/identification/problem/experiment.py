@@ -16,6 +16,7 @@ from scipy.optimize import nnls
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError
+from gms_fsm.foundation.quantities import per_second
 from gms_fsm.identification.problem.runs import (
     LOST,
     ComparedColumn,
@@ -197,7 +198,7 @@ class Experiment:
     def unit_of(self, name: str) -> str:
         """Return the unit of a nuisance term."""
         unit = self.measured.unit
-        return {"offset": unit, "drift": f"{unit}/s".replace("/s/s", "/s^2"), MASS: "kg"}[name]
+        return {"offset": unit, "drift": per_second(unit), MASS: "kg"}[name]
 
     def _solved(self, basis: FloatArray, wanted: FloatArray) -> FloatArray:
         """Solve for the linear parameters, each at least its lower bound.

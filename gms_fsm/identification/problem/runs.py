@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, MissingExtraError, ParameterError, shown
 from gms_fsm.foundation.arguments import some_of, unknown
+from gms_fsm.foundation.quantities import per_second
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.program import Program, arguments, same_text
 from gms_fsm.records.record import Record
@@ -64,12 +65,15 @@ class ComparedColumn:
         The contact whose force it is, if it is one.
     body : str
         The body whose position or velocity it is, if it is one.
+    unit : str
+        Its unit.
     """
 
     text: str
     column: str
     contact: str = ""
     body: str = ""
+    unit: str = ""
 
     @classmethod
     def of(cls, text: Any, subject: Mounted) -> ComparedColumn:
@@ -79,11 +83,14 @@ class ComparedColumn:
         owner, _, which = text.rpartition(".") if isinstance(text, str) else ("", "", "")
         if which == "F":
             if not owner and len(contacts) <= 1:
-                return cls(text, "force", contact=subject.system.contacts[0].name)
-            if owner in contacts:
-                return cls(text, "force", contact=owner)
+                owner = subject.system.contacts[0].name
+            if owner in [each.name for each in subject.system.contacts]:
+                unit = subject.system.contact(owner).chart.force
+                return cls(text, "force", contact=owner, unit=unit)
         elif owner in bodies and which in ("x", "v"):
-            return cls(text, {"x": "position", "v": "velocity"}[which], body=owner)
+            length = subject.system.body(owner).unit
+            column, unit = {"x": ("position", length), "v": ("velocity", per_second(length))}[which]
+            return cls(text, column, body=owner, unit=unit)
         known = ["F"] if len(contacts) <= 1 else []
         known += [f"{name}.F" for name in contacts]
         known += [f"{name}.{each}" for name in bodies for each in "xv"]
@@ -92,11 +99,6 @@ class ComparedColumn:
             place="measured",
             advice=f"it can be {some_of(known)}",
         )
-
-    @property
-    def unit(self) -> str:
-        """Its unit."""
-        return {"force": "N", "position": "m", "velocity": "m/s"}[self.column]
 
     def values(self, ran: FinishedRun, program: Program | None = None) -> FloatArray:
         """Return its values at the rows of a run, with the numbers of a program."""

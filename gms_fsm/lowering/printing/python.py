@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from gms_fsm.charts.chart import SUPPLIED
+from gms_fsm.charts.parts import SUPPLIED
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
     Binary,

@@ -11,7 +11,7 @@ import numpy as np
 from gms_fsm.lowering.log_columns import LogRecord
 from gms_fsm.run.problem import Problem
 from gms_fsm.traces.between import interpolated
-from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.scope import Scope, unit_of
 from gms_fsm.traces.trace import Trace
 
 Place = tuple[float, list[float], tuple[int, ...]]  # time, state and modes
@@ -117,6 +117,19 @@ class Moment:
             lead = f"{bank.name}." if len(banks) > 1 else ""
             for name in ("x", "v", "F", "z", "s"):
                 found[f"{lead}{name}"] = getattr(here, name)
+        return found
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of `values`."""
+        start, found = self._recording.start, dict[str, str]()
+        banks = start.program.layout.banks
+        for bank in banks:
+            lead = f"{bank.name}." if len(banks) > 1 else ""
+            chart = start.system.contact(bank.name).chart
+            own = chart.unit(chart.variables[0]) if chart.variables else ""
+            found |= {f"{lead}{name}": unit_of(chart, name) for name in ("x", "v", "F")}
+            found |= dict.fromkeys((f"{lead}z", f"{lead}s"), own)
         return found
 
     def transitions(self, after: int = 0) -> list[LogRecord]:

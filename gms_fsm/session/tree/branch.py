@@ -31,13 +31,13 @@ from gms_fsm.session.tree.poking import Edits
 from gms_fsm.traces.between import interpolated
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.rows import Rows
-from gms_fsm.traces.scope import Scope
+from gms_fsm.traces.scope import Scope, unit_of
 from gms_fsm.traces.system_scope import SystemScope
 from gms_fsm.traces.trace import Trace
 from gms_fsm.traces.views import steps_of
 from integrators import Firing, Stop
 
-SCALED = {"x": "m", "v": "m/s", "F": "N"}
+SCALED = ("x", "v", "F")
 
 
 class BranchRow(NamedTuple):
@@ -153,11 +153,13 @@ class Branch:
     def scales(self, contact: str) -> dict[str, Scale]:
         """Return how x, v and F of a contact are written: as suits the largest so far."""
         past = {} if self.past is None else self._shared().largest
+        chart = self.start.system.contact(contact).chart
         return {
             name: scale_of(
-                (past.get((contact, name), 0.0), self.largest.get((contact, name), 0.0)), unit
+                (past.get((contact, name), 0.0), self.largest.get((contact, name), 0.0)),
+                unit_of(chart, name),
             )
-            for name, unit in SCALED.items()
+            for name in SCALED
         }
 
     def complete(self) -> None:

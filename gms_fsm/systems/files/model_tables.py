@@ -21,9 +21,9 @@ from pydantic import (
     model_validator,
 )
 
-from gms_fsm.charts.chart import SUPPLIED
 from gms_fsm.charts.gms import LAWS, PARAMETERS, WHICH_C, WHICH_LAW, Law
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, Parameter
+from gms_fsm.charts.parts import SUPPLIED
 from gms_fsm.charts.registry import Entry, registered
 from gms_fsm.charts.zoo.bristles.lugre import LUGRE
 from gms_fsm.errors import ParameterError

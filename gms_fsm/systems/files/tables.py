@@ -203,6 +203,7 @@ class BodyTable(Table):
     x: str = Field("x", description="what texts call its position")
     v: str = Field("v", description="what texts call its velocity")
     motion: Motion = Field("along", description="along the surface, normal to it, or turning")
+    rotary: bool = Field(False, description="whether it turns: rad, Nm; the same as turning")
 
 
 class SpringTable(Table):
@@ -306,6 +307,7 @@ class SystemTable(Table):
     signals: dict[str, SignalField] = Field({})
     flow: dict[str, Value] = Field({})
     let: dict[str, Value] = Field({}, description="named expressions that texts can use")
+    units: dict[str, str] = Field({}, description="SI units of numbers, such as m/rad")
     bodies: list[BodyTable] = Field([], alias="body")
     springs: list[SpringTable] = Field([], alias="spring")
     contacts: list[ContactTable] = Field([], alias="contact")
@@ -336,6 +338,7 @@ def plain(system: System) -> dict[str, Any]:
         "signals": {name: signal_table(signal) for name, signal in system.signals.items()},
         "flow": dict(system.flow),
         "let": dict(system.let),
+        "units": dict(system.units),
         "bodies": [
             BodyTable(
                 name=each.name,
@@ -344,7 +347,8 @@ def plain(system: System) -> dict[str, Any]:
                 velocity=None if each.velocity is None else value_table(each.velocity),
                 x=each.x,
                 v=each.v,
-                motion=each.motion,
+                motion="along" if each.rotary else each.motion,
+                rotary=each.rotary,
             )
             for each in system.bodies
         ],
@@ -392,6 +396,7 @@ def system_from(
         numbers=table.numbers,
         flow=table.flow,  # type: ignore[arg-type]  # numbers become texts there
         let=table.let,  # type: ignore[arg-type]
+        units=table.units,
         sampled=tuple(
             built(Sampled, "sampled", i, **vars(each)) for i, each in enumerate(table.sampled)
         ),

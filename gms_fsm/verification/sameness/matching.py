@@ -14,8 +14,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from gms_fsm.charts.chart import SUPPLIED, Chart
+from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.nesting import Level
+from gms_fsm.charts.parts import SUPPLIED
 from gms_fsm.language import names_in
 from gms_fsm.verification.sameness.canonical import canonical
 from gms_fsm.verification.sameness.meaning import ChartMeaning, meaning_of
