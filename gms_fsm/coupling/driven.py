@@ -145,7 +145,7 @@ def _contact(given: Model | Contact, number: int, several: bool) -> Contact:
 
 def _body(contact: Contact, several: bool) -> Body:
     x, v = (_name(letter, contact.name, several) for letter in "xv")
-    return Body(f"{contact.name}_body", inertia=1.0, x=x, v=v)
+    return Body(f"{contact.name}_body", inertia=1.0, x=x, v=v, rotary=contact.chart.rotary)
 
 
 def _name(letter: str, contact: str, several: bool) -> str:

@@ -43,7 +43,7 @@ def start_of(
     }
     system = System(
         "prescribed velocity",
-        bodies=(Body("body", velocity="v"),),
+        bodies=(Body("body", velocity="v", rotary=contact.chart.rotary),),
         contacts=(contact,),
         signals=signals,
     )

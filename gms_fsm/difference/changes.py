@@ -154,7 +154,7 @@ def _named(
 def _parameters(pair: ChartPair) -> Iterator[PartChange]:
     """Yield changed fields of parameters, initial values and named expressions."""
     a, b, found = pair.a, pair.b, pair.found
-    for each in a.parameters:
+    for each in (a.declared[name] for name in a.parameter_names):
         other = b.declared.get(found.parameters.get(each.name, ""))
         for field, word in FIELDS.items() if other is not None else ():
             one, its = str(getattr(each, field)), str(getattr(other, field))

@@ -104,7 +104,7 @@ def slow_velocity(contact: Contact) -> str:
 
 
 def _is_slow(contact: Contact, velocity: str) -> bool:
-    body = Body("body", velocity="v")
+    body = Body("body", velocity="v", rotary=contact.chart.rotary)
     system = System(
         "prescribed velocity", bodies=(body,), contacts=(contact,), signals={"v": velocity}
     )

@@ -210,6 +210,7 @@ class Stand:
                 **({"inertia": MASS, "force": drives[v]} if self.free else {"velocity": drives[v]}),
                 x="x" if not i else f"x_{v}",
                 v=v,
+                rotary=chart.rotary,
             )
             for i, v in enumerate(chart.velocities)
         )

@@ -24,8 +24,8 @@ from plots.style.presets import font, pt, settings, to_scale
 from plots.views.window import Window
 
 if TYPE_CHECKING:
-    from gms_fsm.identification.result import Estimate, Fit, Residuals
-
+    from gms_fsm.identification.problem.runs import ComparedColumn
+from gms_fsm.identification.result import Estimate, Fit, Residuals
 
 Floats = NDArray[np.float64]
 
@@ -68,16 +68,16 @@ class _Compared:
     factor: float  # from SI to `small`
 
     @classmethod
-    def of(cls, residuals: Residuals, quantity: str, unit: str) -> _Compared:
+    def of(cls, residuals: Residuals, quantity: str, column: ComparedColumn) -> _Compared:
         """Return a record with rows that are not compared left blank."""
         kept = residuals.rows | residuals.held
         measured = np.where(kept, residuals.measured, np.nan)
         difference = measured - residuals.modelled
-        scale = scale_of(_largest(measured), unit)
-        small, short = scaled(difference, unit)
+        scale = scale_of(_largest(measured), column.unit)
+        small, short = scaled(difference, column.unit)
         if _largest(difference) > NEAR * _largest(measured):
             small, short = scale.factor, scale.unit
-        far, place = scaled(residuals.x - residuals.x[0], "m")
+        far, place = scaled(residuals.x - residuals.x[0], column.length)
         return cls(
             quantity,
             scale,
@@ -133,7 +133,7 @@ def fit_figure(
     every = fit.residuals()
     number = _worst(every) if which is None else _checked_which(which, len(every))
     chosen = every[number]
-    part = _Compared.of(chosen, fit.measured, fit.task.measured.unit)
+    part = _Compared.of(chosen, fit.measured, fit.task.measured)
     shown = _checked_window(chosen, part.ends, window)
     listed = fit.table if not low() and len(fit.table) <= MOST_PARAMETERS else ()
     with rc_context(settings()):

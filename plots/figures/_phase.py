@@ -10,6 +10,7 @@ import numpy as np
 from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
 from gms_fsm.foundation.arguments import refusing
+from gms_fsm.foundation.quantities import per_second
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import fitted, narrow, sheet
@@ -89,10 +90,10 @@ def phase(
         over_x = panels.hysteresis(loop, trace, window=window, elements=elements, slipping=True)
         over_v = panels.portrait(portrait, trace, window=window, elements=elements, bar=False)
         x, v = trace.x[row] - trace.x[0], trace.v[row]
-        part = shown(trace, window)
+        part, length = shown(trace, window), trace.model.chart.length
         dots = [
-            _dot(loop, x, part.x - trace.x[0], "m", float(trace.F[row])),
-            _dot(portrait, v, part.v, "m/s", float(trace.F[row])),
+            _dot(loop, x, part.x - trace.x[0], length, float(trace.F[row])),
+            _dot(portrait, v, part.v, per_second(length), float(trace.F[row])),
         ]
         (lines,) = over_v
         assert isinstance(lines, LineCollection)

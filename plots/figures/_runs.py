@@ -167,7 +167,7 @@ def _add_measured(ax: Axes, loop: Axes, measured: Measured, trace: Trace, window
         rasterized=bool(inside.sum() > VECTOR_ROWS),
     )
     legend_above(ax)
-    factor, _ = scaled(shown(trace, window).x - trace.x[0], "m")
+    factor, _ = scaled(shown(trace, window).x - trace.x[0], trace.model.chart.length)
     loop.lines[0].set(linewidth=pt(0.9), zorder=3, rasterized=True)
     loop.plot(
         factor * (measured.x[inside] - trace.x[0]),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.foundation.quantities import scale_of
+from gms_fsm.foundation.quantities import per_second, scale_of
 from gms_fsm.traces.trace import Trace
 from plots.film._pace import Frame
 from plots.panels.parts.selection import has_threshold
@@ -101,7 +101,9 @@ class Bristles:
         # In some charts s is a force and not the threshold of z.
         limit = np.nanmin(curve.s) if self.z is not None and has_threshold(trace) else np.inf
         self.limited = bool(self.scale * limit < space)
-        self.scales = scale_of(self.most["v"], "m/s"), scale_of(self.most["F"], "N")
+        chart = trace.model.chart
+        speed = scale_of(self.most["v"], per_second(chart.length))
+        self.scales = speed, scale_of(self.most["F"], chart.force)
         self.moving: list[Artist] = []
         self._draw()
 
@@ -244,9 +246,9 @@ class Bristles:
 
 
 def _deflection(trace: Trace) -> str | None:
-    """Return the variable that is a deflection: the first in metres, or z."""
+    """Return the variable that is a deflection: the first in metres or radians, or z."""
     chart = trace.model.chart
-    known = [name for name in chart.variables if chart.unit(name) == "m"]
+    known = [name for name in chart.variables if chart.unit(name) == chart.length]
     return next(iter([*known, *(name for name in chart.variables if name == "z")]), None)
 
 

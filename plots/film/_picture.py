@@ -19,6 +19,7 @@ from plots.film._chart import FilmChart
 from plots.film._pace import Frame, Pace
 from plots.output.svg_artists import drawn
 from plots.panels.active_states import spans
+from plots.panels.parts.axes import force_title
 from plots.style import CHART_THEMES, HATCHES, PAGE_THEMES, Theme
 from plots.style.matplotlib import Artist, Axes, Figure, FigureCanvasAgg, Image
 from plots.views.window import Window
@@ -113,7 +114,7 @@ class FilmPicture:
         ax = self._axes(self.left + 0.75, self.said, RIGHT - 0.95, height)
         ax.plot(curve.t, curve.F, color=self.colours.ink, linewidth=1.2)
         ax.set_xlim(*window)
-        ax.set_ylabel("$F$ [N]", fontsize=SIZE)
+        ax.set_ylabel(force_title(curve), fontsize=SIZE)
         ax.tick_params(labelbottom=False)
         self._paint_axes(ax)
         self.cursors = [ax.axvline(window[0])]

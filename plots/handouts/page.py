@@ -17,7 +17,7 @@ import numpy as np
 
 import gms_fsm
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter
+from gms_fsm.charts.parameters import SIGMA_2, STRIBECK, WEIGHTS, Parameter, adapted
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import refusing
@@ -340,7 +340,10 @@ def _rows(model: Model) -> list[tuple[str, str, str, str]]:
     for each in (WEIGHTS, *STRIBECK, SIGMA_2):
         if each.name in shared:
             given.append((each, shared[each.name]))
-    rows = [(each.name, _written(value), each.unit or "–", each.meaning) for each, value in given]
+    rows = [
+        (each.name, _written(value), adapted(each, model.chart).unit or "–", each.meaning)
+        for each, value in given
+    ]
     inputs: Mapping[str, Any] = getattr(model, "inputs", {})
     return rows + [(name, str(text), "–", "input") for name, text in inputs.items()]
 

@@ -120,9 +120,12 @@ def trace_html(trace: Trace) -> str | None:
     parts = [trace.contact(name) for name in trace.contacts] if several else [trace]
     if not parts:
         return None
-    rows = [[p.model.title, p.n, len(p.transitions), *range_of_force(p)] for p in parts]
+    rows = [
+        [p.model.title, p.n, len(p.transitions), *range_of_force(p), p.model.chart.force]
+        for p in parts
+    ]
     return table(
-        ["contact", "elements", "transitions", "least F [N]", "largest F [N]"],
+        ["contact", "elements", "transitions", "least F", "largest F", "unit"],
         rows,
         caption=repr(trace),
         more=f"trace.contact({trace.contacts[0]!r}) shows one of them" if several else "",

@@ -6,6 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
+from gms_fsm.foundation.quantities import per_second
 from gms_fsm.language import latex_name
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import (
@@ -14,6 +15,7 @@ from plots.panels.parts.axes import (
     element_curves,
     element_look,
     first_variable,
+    force_title,
     log_axis,
     note,
     time_axis,
@@ -56,7 +58,7 @@ def velocity(ax: Axes, trace: Trace, *, window: Window | None = None, log: bool 
         The line.
     """
     rows = shown(trace, window)
-    factor, unit = scaled(rows.v, "m/s")
+    factor, unit = scaled(rows.v, per_second(trace.model.chart.length))
     v = factor * (np.abs(rows.v) if log else rows.v)
     ax.set_ylabel(f"{'$|v|$' if log else '$v$'} [{unit}]")
     lines = draw_curve(ax, rows.t, v, color=INK)
@@ -89,7 +91,7 @@ def force(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     for i in this.elements if part.get("elements") is not None else ():
         look = element_look(i, trace.n)
         lines += draw_curve(ax, rows.t, rows.F_elements[:, i], label=f"$F_{{{i + 1}}}$", **look)
-    ax.set_ylabel("$F$ [N]")
+    ax.set_ylabel(force_title(trace))
     time_axis(ax, *this.window)
     return lines
 

@@ -9,9 +9,10 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm.foundation.quantities import per_second
 from gms_fsm.traces.trace import Trace
 from plots.panels._many import counted_away, place_of
-from plots.panels.parts.axes import VECTOR_ROWS, Artists, draw_curve, log_axis
+from plots.panels.parts.axes import VECTOR_ROWS, Artists, draw_curve, force_title, log_axis
 from plots.panels.parts.selection import PartOptions, RunPart, scaled, selected
 from plots.style import INK, LINE_GREY, TEXT_GREY, ramp
 from plots.style.matplotlib import Axes, BoundaryNorm, LineCollection, ListedColormap
@@ -114,14 +115,14 @@ def portrait(
         The collection of lines.
     """
     this = selected(trace, **part)
-    factor, unit = scaled(this.rows.v, "m/s")
+    factor, unit = scaled(this.rows.v, per_second(trace.model.chart.length))
     v = factor * this.rows.v
     if log:
         v = np.abs(v)
         v[v == 0] = np.nan
         log_axis(ax, v, "x")
     lines = _by_slipping(ax, v, this)
-    ax.set(xlabel=f"{'$|v|$' if log else '$v$'} [{unit}]", ylabel="$F$ [N]")
+    ax.set(xlabel=f"{'$|v|$' if log else '$v$'} [{unit}]", ylabel=force_title(trace))
     if bar:
         slip_bar(lines, trace, ax)
     return [lines]
@@ -161,8 +162,8 @@ def hysteresis(
     this = selected(trace, **part)
     rows = this.rows
     x = rows.x - trace.x[0]
-    factor, unit = scaled(x, "m") if scale is None else scale
-    ax.set(xlabel=f"$x$ [{unit}]", ylabel="$F$ [N]")
+    factor, unit = scaled(x, trace.model.chart.length) if scale is None else scale
+    ax.set(xlabel=f"$x$ [{unit}]", ylabel=force_title(trace))
     if slipping:
         return [_by_slipping(ax, factor * x, this)]
     begin = -np.inf

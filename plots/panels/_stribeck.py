@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.errors import shown as written
+from gms_fsm.foundation.quantities import per_second
 from gms_fsm.systems.system import loaded
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.axes import Artists, draw_curve
@@ -71,7 +72,7 @@ def stribeck(
     every = np.concatenate([speeds[speeds > 0], [0.1 * model.stribeck.v_s]])
     low = max(1e-6 * top, float(np.nanmin(every)))
     v = np.geomspace(low, top, 400) if log else np.linspace(0.0, top, 2000)
-    factor, unit = scaled(v, "m/s")
+    factor, unit = scaled(v, per_second(trace.model.chart.length))
     curve = model.stribeck(v)
     drawn = draw_curve(ax, factor * v, curve, color=INK, linestyle="--", label="$s(v)$")
     if model.sigma_2 > 0:
@@ -85,7 +86,7 @@ def stribeck(
         look = {"color": INK, "markerfacecolor": PAPER, "zorder": 4}
         look |= {"markersize": pt(4.5), "label": "measured"}
         drawn += ax.plot(factor * points[0], points[1], "o", **look)
-    ax.set(xlabel=f"$|v|$ [{unit}]", ylabel="$|F|$ [N]")
+    ax.set(xlabel=f"$|v|$ [{unit}]", ylabel=f"$|F|$ [{trace.model.chart.force}]")
     if log:
         ax.set(xscale="log", xlim=(factor * low, 1.15 * factor * top))
     return drawn

@@ -13,7 +13,7 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.quantities import scale_of, trimmed
+from gms_fsm.foundation.quantities import per_second, scale_of, trimmed
 from gms_fsm.traces.trace import Trace
 from plots.panels.parts.selection import checked_row, dotted, scaled
 from plots.style import (
@@ -218,7 +218,7 @@ def _deflection(
     drawn += ax.plot([rest, rest], ends, color=LINE_GREY, linewidth=0.8, linestyle=":", zorder=1)
     label = f"$z_{{{i + 1}}}$"
     if trace is not None:
-        factor, unit = scaled(trace.z[row], "m")
+        factor, unit = scaled(trace.z[row], trace.model.chart.length)
         shown = factor * trace.z[row]
         label += f" = {_signed(shown[i], _decimals(shown))} {unit}"
     if abs(contact - rest) > 0.15:
@@ -251,9 +251,9 @@ def _slider(ax: Axes, n: int, trace: Trace | None, row: int) -> list[Artist]:
     v, F = (0.0, 0.0) if trace is None else (float(trace.v[row]), float(trace.F[row]))
     speed, push = "$v$", "$F$"
     if trace is not None:
-        factor, unit = scaled(np.array([v]), "m/s")
+        factor, unit = scaled(np.array([v]), per_second(trace.model.chart.length))
         speed += f" = {_signed(factor * v, _decimals(np.array([factor * v])))} {unit}"
-        push += f" = {_signed(F, _decimals(np.array([F])))} N"
+        push += f" = {_signed(F, _decimals(np.array([F])))} {trace.model.chart.force}"
     edge = WALL + BODY
     # v to the right is positive; positive friction pulls the slider to the left.
     for height, text, forward in (

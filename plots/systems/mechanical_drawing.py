@@ -91,7 +91,7 @@ def _extent(pen: Pen) -> tuple[float, float, float, float]:
 def _columns(pen: Pen, layout: MechanismLayout) -> None:
     for column in layout.columns:
         body, high = column.body, layout.high
-        fill, corner = PAPER if body.driven else PANEL, ROUND if body.motion == "turning" else 0.0
+        fill, corner = PAPER if body.driven else PANEL, ROUND if body.rotary else 0.0
         gid = f"body {body.name}"
         pen.box(column.left, 0.0, column.width, high, gid, fill=fill, corner=corner)
         name, inertia = column.texts
@@ -140,7 +140,7 @@ def _force(pen: Pen, column: BodyColumn, high: float) -> None:
         pen.arrow((x, high), (x, y + 0.2), gid)
         text = x + 0.25
     else:
-        turns = column.body.motion == "turning"
+        turns = column.body.rotary
         pen.line([(x, high - 0.2 * ROUND * turns), (x, y)])  # from the round corner
         pen.arrow((x, y), (x + 0.8, y), gid, bend=BEND * turns)
     lines = column.force
@@ -186,7 +186,7 @@ def _belts(pen: Pen, layout: MechanismLayout) -> None:
         pen.box(left, y - 0.28, right - left, 0.28, f"body {name}", fill=PAPER)
         body = layout.bodies[name]
         start, end = (right + 0.1, y - 0.14), (right + 0.8, y - 0.14)
-        bend = BEND * (body.motion == "turning")
+        bend = BEND * body.rotary
         pen.arrow(start, end, f"velocity {name}", lw=1.8, bend=bend)
         pen.text(right + 0.9, y + 0.03, name, size=NAME, bold=True, ha="left")
         pen.text(right + 0.9, y - 0.29, motion_of(body), ha="left")

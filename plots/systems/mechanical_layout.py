@@ -64,7 +64,6 @@ class Touch:
     contact: Contact
     symbol: str
     shares: Mapping[str, tuple[int, str]]
-    unit: str  # of its position
 
 
 @dataclass(frozen=True)
@@ -275,7 +274,7 @@ def _number(touch: Touch, name: str) -> str:
     """Return a number of a contact, which is a length or an angle."""
     value = touch.contact.values[name]
     shown = f"{value:.4g}" if isinstance(value, int | float) else "…"
-    return f"{formula(name)} = {shown} {touch.unit}"
+    return f"{formula(name)} = {shown} {touch.contact.chart.unit(name)}"
 
 
 def _wrapped(text: str) -> list[str]:
@@ -304,9 +303,7 @@ def _touch(system: System, contact: Contact) -> Touch:
             if share is not None and share != Number(0.0):
                 shares.setdefault(body.name, _share(share))
     many = len(shares) > 2 or len(contact.v) > 1
-    units = {system.body(name).unit for name in shares}
-    symbol = "box" if many else _symbol(contact)
-    return Touch(contact, symbol, shares, units.pop() if len(units) == 1 else "m")
+    return Touch(contact, "box" if many else _symbol(contact), shares)
 
 
 def _share(tree: Value) -> tuple[int, str]:

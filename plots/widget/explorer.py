@@ -31,6 +31,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.numbers import law_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
+from gms_fsm.traces.system_scope import units_of
 from gms_fsm.traces.trace import Trace
 from plots.page.chart import chart_svg
 from plots.page.replay import page_data, page_html
@@ -361,11 +362,11 @@ class Explorer(anywidget.AnyWidget):
             )
         if not start.what.named:
             free = any(not body.driven for body in start.system.bodies)
-            return {"contacts": contacts, "others": ["v"] if free else []}
-        return {
-            "contacts": contacts,
-            "others": [name for name in pokeable(start) if name not in own],
-        }
+            others = ["v"] if free else []
+        else:
+            others = [name for name in pokeable(start) if name not in own]
+        units = units_of(start.what, others)
+        return {"contacts": contacts, "others": [[name, units.get(name, "")] for name in others]}
 
     # ------------------------------------------------------------------ requests of the browser
     @traitlets.observe("request")

@@ -196,7 +196,7 @@ class Poke {
         ...(contact.states.length > 1 ? each.map((element) => ({ contact, what: "", element, unit: "", text: `${lead}state ${element + 1}` })) : []),
       ];
     });
-    this.options = [...names, ...others.map((what) => ({ contact: { name: "", states: [] }, what, element: -1, unit: what === "v" ? "m/s" : "", text: what }))];
+    this.options = [...names, ...others.map(([what, unit]) => ({ contact: { name: "", states: [] }, what, element: -1, unit, text: what }))];
     const before = this.what.selectedOptions[0]?.textContent;
     this.what.replaceChildren();
     for (const { text, unit } of this.options) make("option", this.what, unit ? `${text} [${unit}]` : text);

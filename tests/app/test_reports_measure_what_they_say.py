@@ -124,7 +124,7 @@ def test_the_range_of_the_force_is_over_what_lasts() -> None:
     assert np.abs(guide.F).max() > 7e3
     ends = [k for k in range(1, len(trace)) if trace.t[k] > trace.t[k - 1]]
     lasting = guide.F[sorted({*ends, *(k - 1 for k in ends)})]
-    said = f"F from {lasting.min():.4g} to {lasting.max():.4g}\n"
+    said = f"F from {lasting.min():.4g} to {lasting.max():.4g} N\n"
     assert np.abs(lasting).max() < 100
     assert said in summary_text(table, trace, trace.trust())
 

@@ -98,8 +98,8 @@ BLOCKS = System(
 SERVO = System(
     "two-mass servo",
     bodies=(
-        Body("motor", inertia="J_m", force="k_t * i", x="q_m", v="w_m", motion="turning"),
-        Body("load", inertia="J_l", x="q_l", v="w_l", motion="turning"),
+        Body("motor", inertia="J_m", force="k_t * i", x="q_m", v="w_m", rotary=True),
+        Body("load", inertia="J_l", x="q_l", v="w_l", rotary=True),
     ),
     contacts=(
         Contact("bearing", STICTION, DRY, v="w_m"),

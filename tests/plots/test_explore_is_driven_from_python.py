@@ -139,7 +139,7 @@ def test_a_system() -> None:
     assert widget.branches[1].text == "x_m = 0.1 at 1 s"
     ask(widget, do="poke", contact="pad", what="", element=0, value="forward", t=3.0, microstep=0)
     assert widget.panel["laws"] == []
-    assert widget.panel["pokes"]["others"] == ["x_m", "v_m"]
+    assert widget.panel["pokes"]["others"] == [["x_m", "m"], ["v_m", "m/s"]]
 
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -123,7 +123,7 @@ def expected(chart: Chart) -> tuple[list[list[str]], list[tuple[int, int, str]]]
 @pytest.fixture
 def hostile(monkeypatch: pytest.MonkeyPatch) -> Chart:
     """Return a chart with invalid names."""
-    monkeypatch.setattr(gms_fsm.charts.chart, "_check_name", lambda *_: None)
+    monkeypatch.setattr(gms_fsm.charts.chart, "check_name", lambda *_: None)
     bad = 'a"\n[*] --> evil: <b>&#x41;; %%{init}%% \u2028 --'
     return Chart(
         name=bad,

@@ -154,7 +154,7 @@ class PlainC:
             f"    double {each.name}{size};{FORMS.note(each.about)}" for each in element.variables
         ]
         if element.position:
-            fields.append(f"    double {element.position};  /* m: position */")
+            fields.append(f"    double {element.position};  /* {self.element.length}: position */")
         if several:
             fields.append(f"    enum {self.name}_state state{size};")
         lines = [
@@ -176,7 +176,7 @@ class PlainC:
             "",
             f"void {self.name}_start({self.name} *{self.me});",
             "",
-            "/* One step: the force at its beginning [N]. */",
+            f"/* One step: the force at its beginning [{self.element.force}]. */",
             f"{self.signature()};",
             "",
             "#ifdef __cplusplus",

@@ -71,6 +71,8 @@ class NamedFriction:
         All numbers that are read.
     variables : tuple of Variable
         Of an element.
+    length, force : str
+        Units of the position and of the force.
     position : str
         The integral of the velocity, where it is read; else empty.
     position_start : float
@@ -100,6 +102,8 @@ class NamedFriction:
     inputs: tuple[tuple[str, str], ...]
     constants: tuple[Constant, ...]
     variables: tuple[Variable, ...]
+    length: str
+    force: str
     position: str
     position_start: float
     lets: tuple[Let, ...]
@@ -455,6 +459,8 @@ class PlanReader:
             inputs=tuple(inputs),
             constants=tuple(each for each in self.constants() if each.name in used),
             variables=tuple(self.variable(name) for name in bank.variables),
+            length=bank.chart.length,
+            force=bank.chart.force,
             position="x" if "x" in used else "",
             position_start=float(start.y[layout.y.index(bank.position)]),
             lets=read,

@@ -500,7 +500,7 @@ class FunctionFile:
 In MATLAB or Octave, in this folder:
 
     s = {name}();                          % at the beginning
-    [s, F] = {name}(s, v0, v1, dt{further});  % force at the end of dt [N]
+    [s, F] = {name}(s, v0, v1, dt{further});  % force at the end of dt [{self.element.force}]
     s.log                                  % rows of time, element, edge
     s.edges(s.log(:, 3))                   % names of the edges
 

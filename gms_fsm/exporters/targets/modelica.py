@@ -99,11 +99,11 @@ class ModelOfElements:
         constants = [self.constant(each) for each in element.constants]
         lines = [*self.one_element(), "", f"model {self.name} {_string(element.title)}"]
         lines += _inside([f"input Real {name}{_comment(about)};" for name, about in element.inputs])
-        lines += _inside(['output Real F "N: friction force";', *constants])
+        lines += _inside([f'output Real F "{element.force}: friction force";', *constants])
         if element.position:
             start = MODELICA.number(element.position_start)
-            declared = f'Real {element.position}(start = {start}, fixed = true) "m: position";'
-            lines += _inside([declared])
+            declared = f"Real {element.position}(start = {start}, fixed = true)"
+            lines += _inside([f'{declared} "{element.length}: position";'])
         size = f"[{element.n}]" if element.n > 1 else ""
         lines += _inside([f"{self.kind} {self.one}{size}({self.given()});"])
         lines += ["protected"] * bool(self.shared_lets)
@@ -157,7 +157,7 @@ class ModelOfElements:
         element = self.element
         lines = [f'model {self.kind} "One element of {self.name}"']
         inner = [f"input Real {name};" for name in self.passed()]
-        inner.append(f'output Real {self.part} "N: force of the element";')
+        inner.append(f'output Real {self.part} "{element.force}: force of the element";')
         inner += [
             f"parameter Real {each.name}{_comment(each.about)};"
             for each in element.constants

@@ -135,7 +135,7 @@ def _own_parts(root: ET.Element, chart: Chart) -> None:
             unit = chart.unit(name)
             more = {"unit": unit} if unit else {}
             ET.SubElement(own, "gms:quantity", {"kind": kind, "name": name, **more})
-    for each in chart.parameters:
+    for each in (chart.declared[name] for name in chart.parameter_names):
         told = fields_of(each).items()
         fields = {key: "false" if value is False else str(value) for key, value in told}
         ET.SubElement(own, "gms:parameter", {"name": each.name, **fields})

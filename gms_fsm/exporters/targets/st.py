@@ -177,13 +177,13 @@ class StructuredText:
     # ------------------------------------------------------------------ the text
     def text(self) -> str:
         element, name = self.element, self.name
-        body = self.walker.lines(self.form.step)
+        body, told = self.walker.lines(self.form.step), f"{element.force}: friction force"
         inputs = [*element.inputs, (self.form.dt, "s: since the last call")]
         lines = [
             f"(* {FORMS.clean(element.title)}: the plain form, to be called once a cycle. *)",
             f"FUNCTION_BLOCK {name}",
             *_block("VAR_INPUT", (f"{each} : LREAL;{FORMS.note(about)}" for each, about in inputs)),
-            *_block("VAR_OUTPUT", [f"{self.force} : LREAL;  (* N: friction force *)"]),
+            *_block("VAR_OUTPUT", [f"{self.force} : LREAL;  (* {told} *)"]),
             *_block("VAR CONSTANT", self.constants()),
             *_block("VAR", self.memory()),
             *_block("VAR", self.locals()),

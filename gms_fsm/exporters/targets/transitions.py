@@ -94,7 +94,7 @@ def _data(chart: Chart) -> dict[str, Any]:
         "INPUTS": chart.inputs,
         "VELOCITIES": chart.velocities,
         "VARIABLES": tuple(name for name in chart.variables if name not in chart.hidden),
-        "PARAMETERS": tuple(_parameter(each) for each in chart.parameters),
+        "PARAMETERS": tuple(_parameter(chart.declared[name]) for name in chart.parameter_names),
         "LET": dict(chart.let),
         "STATES": tuple(_state(state) for state in chart.nesting.states),
         "TRANSITIONS": tuple(
@@ -206,7 +206,8 @@ def _program(chart: Chart, contact: Contact | None) -> Iterator[str]:
     given = "".join(f', "{name}": 0.0' for name in others)
     velocity = "0.15 * sin(2 * pi * t / 25)" if contact is None else slow_velocity(contact)
     moved = spell(parse_value(velocity, ["t"]))
-    yield DEMONSTRATION.replace("VELOCITY", moved).replace("OTHERS", given)
+    shown = DEMONSTRATION.replace("LENGTH", chart.length).replace("TORQUE", chart.force)
+    yield shown.replace("VELOCITY", moved).replace("OTHERS", given)
 
 
 def _assigned(name: str, value: Any) -> str:
@@ -300,7 +301,7 @@ def _total(chart: Chart, contact: Contact | None) -> Iterator[str]:
     if contact is not None and contact.model is not None:
         total += f" + SIGMA_2 * first.{chart.velocities[0]}"
     yield "def force(elements):"
-    yield '    """Return the force of the contact [N]."""'
+    yield f'    """Return the force of the contact [{chart.force}]."""'
     yield "    F, first = 0.0, elements[0]"
     yield "    for each in elements:"
     yield '        F += getattr(each, f"_force_{each.state}")()'
@@ -428,7 +429,7 @@ def _loop() -> str:
 
 DEMONSTRATION = '''\
 def record(t):
-    """Return the record of the demonstration: a velocity [m/s] that turns back slowly."""
+    """Return the record of the demonstration: a velocity [LENGTH/s] that turns back slowly."""
     return {"v": VELOCITYOTHERS}
 
 
@@ -439,8 +440,9 @@ def main(t_end=25.0, step=1e-3):
         for i, edge in enumerate(edges):
             if edge is not None:
                 switches += 1
-                print(f"t = {t:.6g} s  v = {v:.4g} m/s  element {i + 1}: {edge} -> {states[i]}")
-    print(f"{switches} switches; F = {total:.6g} N at t = {t:.6g} s")
+                moved = f"t = {t:.6g} s  v = {v:.4g} LENGTH/s"
+                print(f"{moved}  element {i + 1}: {edge} -> {states[i]}")
+    print(f"{switches} switches; F = {total:.6g} TORQUE at t = {t:.6g} s")
 
 
 if __name__ == "__main__":

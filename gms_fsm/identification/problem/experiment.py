@@ -198,7 +198,8 @@ class Experiment:
     def unit_of(self, name: str) -> str:
         """Return the unit of a nuisance term."""
         unit = self.measured.unit
-        return {"offset": unit, "drift": per_second(unit), MASS: "kg"}[name]
+        mass = "kg" if self.measured.length == "m" else "kg m^2"
+        return {"offset": unit, "drift": per_second(unit), MASS: mass}[name]
 
     def _solved(self, basis: FloatArray, wanted: FloatArray) -> FloatArray:
         """Solve for the linear parameters, each at least its lower bound.

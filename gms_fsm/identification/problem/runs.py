@@ -100,6 +100,11 @@ class ComparedColumn:
             advice=f"it can be {some_of(known)}",
         )
 
+    @property
+    def length(self) -> str:
+        """Unit of the position of what it belongs to."""
+        return "rad" if self.unit in ("Nm", "rad", "rad/s") else "m"
+
     def values(self, ran: FinishedRun, program: Program | None = None) -> FloatArray:
         """Return its values at the rows of a run, with the numbers of a program."""
         program = ran.program if program is None else program

@@ -13,7 +13,7 @@ import numpy as np
 from gms_fsm.charts.chart import Chart, Transition
 from gms_fsm.charts.gms import TABLE_I
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.foundation.quantities import in_words
+from gms_fsm.foundation.quantities import in_words, of_rotation, per_second
 from gms_fsm.language import Call, Name, Number, Relation, Value, clauses, evaluate, names_in
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.session.explain import holds, values_at
@@ -113,6 +113,7 @@ def _weight(trace: Trace) -> Iterator[str]:
 def _sizes(trace: Trace) -> Iterator[str]:
     """Compare stroke, speed and deflections with the scales of the model."""
     model, scales = trace.model, scales_of(trace.model)
+    length, speed = model.chart.length, per_second(model.chart.length)
     if not model.chart.variables:
         return
     name = model.chart.variables[0]
@@ -127,28 +128,28 @@ def _sizes(trace: Trace) -> Iterator[str]:
             bound = "v_c" if "v_c" in model.values else "the smallest speed in a guard"
             yield (
                 f"no transition: the speed stays below {bound} (largest |v| "
-                f"{in_words(fastest, 'm/s', 3)}, {bound} {in_words(scales.speed, 'm/s', 3)})"
+                f"{in_words(fastest, speed, 3)}, {bound} {in_words(scales.speed, speed, 3)})"
             )
         elif model.stribeck is not None and (model.weights == 1.0).all() and not _of_table_1(model):
             yield (
                 f"no transition: an element breaks away at its weight times the Stribeck curve, "
-                f"here {in_words(float(thresholds.min()), 'm', 3)} or more, because all weights "
-                "are 1 m/N, as in Table I of the paper; give shares of the friction, which sum to "
-                "1, or weights"
+                f"here {in_words(float(thresholds.min()), length, 3)} or more, because all weights "
+                f"are 1 {length}/{model.chart.force}, as in Table I of the paper; give shares of "
+                "the friction, which sum to 1, or weights"
             )
         elif 0.0 < deflected < NEAR:
             smallest = in_words(float(thresholds.min()), model.chart.unit(name), 3)
             yield (
                 f"no transition: no element comes near its threshold (largest |{name}| is "
                 f"{deflected:.2g} of it, the smallest threshold {smallest}); if this "
-                f"is not intended, check the units of {_scaling(model)}motion (m)"
+                f"is not intended, check the units of {_scaling(model)}motion ({length})"
             )
     elif stroke > FAR * (most := _largest(trace, thresholds)):
         times = f"{stroke / most:.2g} times"
         yield (
-            f"the stroke of {in_words(stroke, 'm', 3)} is {times} the largest threshold: nearly "
+            f"the stroke of {in_words(stroke, length, 3)} is {times} the largest threshold: nearly "
             "all of it is gross sliding; if pre-sliding is intended, check the unit of the motion "
-            "(m)"
+            f"({length})"
         )
 
 
@@ -163,7 +164,8 @@ def _of_table_1(model: Model) -> bool:
 
 def _scaling(model: Model) -> str:
     """Return the parameters that scale thresholds and forces, with their units."""
-    known = [each for each in parameters_of(model) if each.unit in ("N/m", "m/N")]
+    units = {unit for each in ("N/m", "m/N") for unit in (each, of_rotation(each))}
+    known = [each for each in parameters_of(model) if each.unit in units]
     return ", ".join(f"{each.name} ({each.unit})" for each in known) + (" and " if known else "")
 
 

@@ -61,12 +61,12 @@ def in_their_units(machines: tuple[Contact, ...], system: System, here: str) -> 
     """Return contacts whose charts know in which units they are measured."""
     found = []
     for each in machines:
-        units = tuple(
-            (name, unit)
-            for name in _own(each)
-            if (unit := system.units.get(f"{each.name}.{name}")) is not None
-        )
-        chart = measured(each.chart, bool(each.v) and _turns(each, system, here), units)
+        known = dict(each.chart.units)  # as another system has declared them
+        for name in _own(each):
+            if (unit := system.units.get(f"{each.name}.{name}")) is not None:
+                known[name] = unit
+        rotary = bool(each.v) and _turns(each, system, here)
+        chart = measured(each.chart, rotary, tuple(known.items()))
         found.append(each if chart is each.chart else each.replaced(chart=chart))
     return tuple(found)
 

@@ -141,7 +141,7 @@ def _check_parts(a: Chart, b: Chart, found: Matching) -> None:
     for name, its in found.variables.items():
         if a.initial.get(name, 0.0) != b.initial.get(its, 0.0):
             raise Differ(f"variable {name!r} begins with another value")
-    for each in a.parameters:
+    for each in (a.declared[name] for name in a.parameter_names):
         other_one = b.declared[found.parameters[each.name]]
         for what in ("unit", "per_element"):
             if getattr(each, what) != getattr(other_one, what):

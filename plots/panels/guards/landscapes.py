@@ -90,8 +90,9 @@ def view_of(trace: Trace, element: int, plane: Plane) -> PlaneWindow:
     low, high = float(reach.min()), float(reach.max())
     pad = 0.14 * (high - low) or 0.5 * abs(high) or 1.0
     factor, title = axis_title(second, unit_of(chart, second), np.array([low - pad, high + pad]))
-    told = (each.scale for edge in plane.why for each in edge.clauses if each.unit == "m/s")
-    speeds = next(told, scale_of(speed, "m/s"))
+    unit = unit_of(chart, velocity)
+    told = (each.scale for edge in plane.why for each in edge.clauses if each.unit == unit)
+    speeds = next(told, scale_of(speed, unit))
     return PlaneWindow(linear, speed, low - pad, high + pad, factor, title, speeds)
 
 

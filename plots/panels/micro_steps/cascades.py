@@ -15,6 +15,7 @@ from plots.panels.parts.axes import (
     draw_curve,
     element_curves,
     element_look,
+    force_title,
     no_threshold,
     time_axis,
 )
@@ -229,6 +230,6 @@ def cascade(
         *ax.plot(log.t, log.F_before, "o", label="F before", **before),
         *ax.plot(log.t, log.F_after, "o", label="F after", **after),
     ]
-    ax.set_ylabel("$F$ [N]")
+    ax.set_ylabel(force_title(trace))
     time_axis(ax, *this.window)
     return [*lines, *dots, *marks(ax, trace, window=this.window, elements=this.elements)]

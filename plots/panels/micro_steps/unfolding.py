@@ -232,7 +232,7 @@ def unfolded_force(ax: Axes, part: Unfolded) -> Artists:
         values, and the marks of the gaps.
     """
     F = np.array([each.F for each in part.columns])
-    factor, unit = scaled(F, "N")
+    factor, unit = scaled(F, part.trace.model.chart.force)
     drawn: Artists = []
     for instant in range(part.times.size):
         own = part.of(instant)

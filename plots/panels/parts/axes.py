@@ -27,6 +27,11 @@ def first_variable(trace: Trace, values: NDArray[np.float64]) -> tuple[float, st
     return axis_title(chart.variables[0], chart.unit(chart.variables[0]), values)
 
 
+def force_title(trace: Trace) -> str:
+    """Return the title of an axis of the force."""
+    return f"$F$ [{trace.model.chart.force}]"
+
+
 def axis_title(name: str, unit: str | None, values: NDArray[np.float64]) -> tuple[float, str]:
     """Return factor and title of a quantity: its symbol, and a unit in which its values fit."""
     symbol = f"${latex_name(name)}$"

@@ -241,7 +241,7 @@ def dotted(unit: str) -> str:
 
     Examples
     --------
-    >>> dotted("300 mNs/m"), dotted("Nm/rad")
-    ('300 mN·s/m', 'N·m/rad')
+    >>> dotted("300 mNs/m"), dotted("Nm/rad"), dotted("Nms/rad")
+    ('300 mN·s/m', 'N·m/rad', 'N·m·s/rad')
     """
-    return re.sub(r"N(?=[sm])", "N·", unit)
+    return re.sub(r"N(?=[sm])", "N·", unit).replace("N·ms", "N·m·s")

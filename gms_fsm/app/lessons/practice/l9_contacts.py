@@ -136,7 +136,6 @@ from gms_fsm.app.lessons.engine.lesson import FIRST, GUIDE, SECOND, Lesson, draw
 from gms_fsm.app.lessons.engine.predict import Question
 from gms_fsm.charts import CHARTS
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.systems.parts import Motion
 from plots.style import INK, LINE_GREY
 
 MASS, STIFFNESS, SPEED = 1.0, 2.0, 0.1  # kg, N/m, m/s: the pulled mass
@@ -179,10 +178,8 @@ def gear(gap: float = FLANK["gap"]) -> System:
     return System(
         "gear with backlash",
         bodies=(
-            Body(
-                "motor", velocity="V * sgn(sin(2 * pi * t / T))", x="q_m", v="w_m", motion="turning"
-            ),
-            Body("load", inertia="J", x="q_l", v="w_l", motion="turning"),
+            Body("motor", velocity="V * sgn(sin(2 * pi * t / T))", x="q_m", v="w_m", rotary=True),
+            Body("load", inertia="J", x="q_l", v="w_l", rotary=True),
         ),
         contacts=(
             Contact("gear", CHARTS["backlash"], {**FLANK, "gap": gap}, v="w_m - w_l"),
@@ -201,7 +198,7 @@ def impact(e: float = STOP["e"]) -> System:
     ('v_1 - v_2',)
     """
     stop = Contact("stop", CHARTS["end-stop"], {**STOP, "e": e}, v="v_1 - v_2")
-    return _pair(stop, MASSES, "along")
+    return _pair(stop, MASSES)
 
 
 def clutch() -> System:
@@ -213,12 +210,12 @@ def clutch() -> System:
     True
     """
     dog = Contact("dog", CHARTS["dog-clutch"], DOG, v="v_1 - v_2")
-    return _pair(dog, INERTIAS, "turning")
+    return _pair(dog, INERTIAS, rotary=True)
 
 
-def _pair(contact: Contact, inertias: tuple[float, float], motion: Motion) -> System:
+def _pair(contact: Contact, inertias: tuple[float, float], *, rotary: bool = False) -> System:
     bodies = (
-        Body(name, inertia=f"m_{i}", x=f"x_{i}", v=f"v_{i}", motion=motion)
+        Body(name, inertia=f"m_{i}", x=f"x_{i}", v=f"v_{i}", rotary=rotary)
         for i, name in enumerate(("one", "two"), 1)
     )
     numbers = dict(zip(("m_1", "m_2"), inertias, strict=True))

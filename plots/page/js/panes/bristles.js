@@ -2,6 +2,7 @@
 // Bristles: the slider and its elements, each a spring and a damper to a contact on the ground, as in
 // plots/schematic.py. The slider stands still; contacts and ground move. They move by the same number of pixels per
 // metre, so that a contact that sticks stays where it is on the ground.
+const LENGTHS = new Set(["m", "rad"]);
 const BRISTLE = { least: 26, two: 38, most: 64, page: 44, head: 42, slider: 26, arrow: 46, contact: 16, period: 60 }; // px
 
 // A spring above a damper, 100 long and 1 high; it is stretched by a transform.
@@ -19,10 +20,10 @@ class BristlesPane {
 
   choose(other) { if (!other) this.show(); }
 
-  // The variable that is a deflection: the first one in metres, or z. Other variables are not drawn as springs.
+  // The variable that is a deflection: the first one in metres or radians, or z. Other variables are not drawn as springs.
   deflection() {
     const { variables, units } = this.view.contact;
-    return variables.find((name) => units[name] === "m") ?? variables.find((name) => name === "z") ?? null;
+    return variables.find((name) => LENGTHS.has(units[name])) ?? variables.find((name) => name === "z") ?? null;
   }
 
   // ---------------------------------------------------------------- what is drawn once per contact and size
@@ -41,7 +42,7 @@ class BristlesPane {
     this.rest = this.left + BRISTLE.contact / 2 + 6 + this.swing;
     this.largest = { v: this.most(contact.velocity), F: this.most("F"), z: z ? this.most(z) : 0 };
     // Pixels per metre; without springs the whole run is 20 periods of the ground.
-    this.scale = contact.units[z] === "m" && this.largest.z > 0 ? this.swing / this.largest.z : (20 * BRISTLE.period) / (this.most("x") || 1);
+    this.scale = LENGTHS.has(contact.units[z]) && this.largest.z > 0 ? this.swing / this.largest.z : (20 * BRISTLE.period) / (this.most("x") || 1);
     this.build(width, forces);
     this.show();
   }

@@ -280,7 +280,7 @@ class LandscapePane {
     const held = points.held.map((name) => `${name} = ${contact.tell(name, points.given[name])}`);
     say(this.caption, [
       points.again.length ? `${points.again.join(", ")} computed at each point.` : "",
-      points.flow ? `Arrows: d${z}/dt of ${contact.states[state]} at each point, d${points.v}/dt = ${eng(faster, "m/s^2", 3)} of the run near the row.` : `No arrows: the chart has no flow of ${z}.`,
+      points.flow ? `Arrows: d${z}/dt of ${contact.states[state]} at each point, d${points.v}/dt = ${eng(faster, `${contact.units[points.v]}^2`, 3)} of the run near the row.` : `No arrows: the chart has no flow of ${z}.`,
       held.length ? `As at the row: ${held.join(", ")}.` : "",
     ].filter(Boolean).join(" "));
   }
