@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from gms_fsm.coupling.bank import FrictionBank as FrictionBank
     from gms_fsm.coupling.equations import FrictionEquations as FrictionEquations
     from gms_fsm.coupling.stepping import FrictionState as FrictionState
+    from gms_fsm.coupling.system_state import SystemState as SystemState
     from gms_fsm.difference.diff import Diff as Diff
     from gms_fsm.difference.diff import diff as diff
     from gms_fsm.errors import ChartError as ChartError
@@ -124,6 +125,7 @@ _HOMES = {
     "run.settings": "Settings",
     "run.simulate": "simulate",
     "coupling.stepping": "FrictionState",
+    "coupling.system_state": "SystemState",
     "run.sweep": "Sweep sweep",
     "systems.gms_parameters": "GMSParameters",
     "systems.models": "ChartModel GMS LuGre Model",

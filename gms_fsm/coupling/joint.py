@@ -24,6 +24,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 from gms_fsm.traces.failures import (
     LivelockError,
+    LockError,
     NotFiniteError,
     NotUniqueError,
     SimulationError,
@@ -48,6 +49,27 @@ FAILURES: Mapping[int, tuple[type[SimulationError], str]] = {
     advance.NOT_FINITE: (NotFiniteError, "the flow is NaN or infinite"),
     loop.ENTANGLED: (NotUniqueError, "it is between states on surfaces that cross: not unique"),
 }
+REFUSED = LockError, "its velocity has jumped, and no edge may be taken there"  # of systems
+
+
+def failure(
+    start: Problem, memory: JointMemory, code: int, element: str, what: str, now: float
+) -> SimulationError:
+    """Return the error for a sample that cannot be completed."""
+    b = memory.buffers
+    t, modes = b.now.t, hybrid.modes_of(b)
+    where = np.array([t]), np.zeros(1, dtype=np.int64), np.array([b.now.y]), np.array([modes])
+    row = Rows(*where)
+    kind, reason = FAILURES.get(code, REFUSED)
+    error = kind(
+        reason,
+        start.trace(row, row, start.firings([])),
+        t=t,
+        place=element if code in (loop.MACHINE_LIVELOCK, loop.REFUSED) else "",
+        advice=f"the {what} is as it was before the call, at t = {now!r} s",
+    )
+    error.kept = ""  # a sample has no rows
+    return error
 
 
 class ElementSwitch(NamedTuple):
@@ -140,21 +162,8 @@ class Joint:
 
     def _failure(self, code: int, now: float) -> SimulationError:
         """Return the error for a sample that cannot be completed."""
-        b, start = self.memory.buffers, self.start
-        t, modes = b.now.t, hybrid.modes_of(b)
-        where = np.array([t]), np.zeros(1, dtype=np.int64), np.array([b.now.y]), np.array([modes])
-        row = Rows(*where)
-        kind, reason = FAILURES[code]
-        element = f"element {b.memory.machine + 1}"
-        error = kind(
-            reason,
-            start.trace(row, row, start.firings([])),
-            t=t,
-            place=element if code == loop.MACHINE_LIVELOCK else "",
-            advice=f"the friction is as it was before the call, at t = {now!r} s",
-        )
-        error.kept = ""  # a sample has no rows
-        return error
+        machine = self.memory.buffers.memory.machine
+        return failure(self.start, self.memory, code, f"element {machine + 1}", "friction", now)
 
     # ------------------------------------------------------------------ what it found
     @property

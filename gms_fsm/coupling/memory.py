@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import IfElse
-from gms_fsm.run.problem import Problem
+from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.ticks import EXACT, clocks_of, in_units
 from gms_fsm.systems.signals import Corners
 from integrators import hybrid
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 MOST_SWITCHES = 64  # in the log of a sample; when it is full, it is emptied and the sample goes on
 SAMPLED, LOGGED = tuple(numbers_of(Sample)), ("t", "machine", "edge")
+PLANNED, ORIGIN = ("jumps", "before_jumps", "ticks"), ("begin", "units")
 
 
 class JointMemory(NamedTuple):
@@ -50,8 +51,31 @@ class JointMemory(NamedTuple):
             if name in state:
                 place[:] = state[name]
 
+    def whole(self) -> dict[str, Any]:
+        """Return all that a sample changes: `state`, the log, what ticks next, what was seen."""
+        sample, plan = self.sample, self.buffers.plan
+        return {
+            **self.state(),
+            **{f"times {k}": self.tables[2 * k] for k in range(sample.given)},
+            **{f"log {name}": getattr(sample, name) for name in LOGGED},
+            **{name: getattr(plan, name) for name in PLANNED},
+            "made": sample.clocks.made,
+            "seen": sample.seen,
+            "origin": numbers_in(sample.clocks, ORIGIN),
+            "sample": numbers_in(sample, SAMPLED),
+        }
+
+    def put_whole(self, state: Mapping[str, Sequence[Any]]) -> None:
+        """Return to what `whole` returned."""
+        self.put(state)
+        put_numbers(self.sample, SAMPLED, state["sample"])
+        put_numbers(self.sample.clocks, ORIGIN, state["origin"])
+        for name, place in self.whole().items():
+            if name not in ("sample", "origin"):
+                place[:] = state[name]
+
     def _inputs(self) -> dict[str, Any]:
-        return {f"input {k}": self.tables[2 * k + 1] for k in range(len(self.sample.inputs))}
+        return {f"input {k}": self.tables[2 * k + 1] for k in range(self.sample.given)}
 
 
 def fast() -> bool:
@@ -66,33 +90,27 @@ class ListMemory:
     Calling `run` advances it; see `step_to`.
     """
 
-    def __init__(self, starts: Sequence[Problem]) -> None:
+    def __init__(self, starts: Sequence[Problem], *, waits: bool = False) -> None:
         (start,) = starts
         program = start.program
         switch, observe = IfElse(program), program.ieee["observe"]
         functions = equations(program).functions(located=True)
         machines = Machines(switch.ask, switch.act, switch.tick, switch.jolts, observe)
-        buffers, self.sample = prepared(start)
+        buffers, self.sample = prepared(start, waits=waits)
         self.run = functools.partial(step_to, functions, machines, buffers, self.sample)
         self.each = (JointMemory(buffers, functions.p[2], self.sample, self.run),)
         self.lines = self.sample.inputs
 
     def copy(self, _into: Any = None, /) -> Any:
         """Return the present state."""
-        log = {f"log {name}": getattr(self.sample, name) for name in LOGGED}
-        numbers = {"sample": numbers_in(self.sample, SAMPLED)}
-        state = {**self.each[0].state(), **log, **numbers}
-        return {name: list(place) for name, place in state.items()}
+        return {name: list(place) for name, place in self.each[0].whole().items()}
 
     def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
-        self.each[0].put(copy)
-        put_numbers(self.sample, SAMPLED, copy["sample"])
-        for name in LOGGED:
-            getattr(self.sample, name)[:] = copy[f"log {name}"]
+        self.each[0].put_whole(copy)
 
 
-def prepared(start: Problem) -> tuple[Buffers, Sample]:
+def prepared(start: Problem, *, waits: bool = False) -> tuple[Buffers, Sample]:
     """Return the buffers of a run without an end, and its first sample."""
     program, layout = start.program, start.program.layout
     made, size = equations(program), layout.y.size
@@ -100,7 +118,7 @@ def prepared(start: Problem) -> tuple[Buffers, Sample]:
         made, start.t_start, start.y, start.mode, math.inf, start.options, capacity=1
     )
     clocks = _clocks(start)
-    two = [0.0] * 2 if clocks.made else []
+    two = [0.0] * 2 if clocks.made or waits else []
     plan = b.plan._replace(
         jumps=[*two], before_jumps=[*two], ticks=[0] * len(two), knots=[start.t_start]
     )
@@ -109,6 +127,10 @@ def prepared(start: Problem) -> tuple[Buffers, Sample]:
     lines = [each for each in start.system.signals.values() if isinstance(each, Corners)]
     sample = Sample(
         end=start.t_start,
+        until=-LATEST,
+        given=len(start.system.inputs) if waits else len(lines),
+        waits=False,
+        jumps=False,
         wanted=layout.recorded[1][0][2],  # its force
         mean=False,
         resumed=False,
@@ -153,14 +175,14 @@ class BlockMemory:
     item is a number if there is one joint, else one number per joint.
     """
 
-    def __init__(self, starts: Sequence[Problem]) -> None:
+    def __init__(self, starts: Sequence[Problem], *, waits: bool = False) -> None:
         from integrators.machine_code.layout import MemoryBlock
 
-        code, count = machine_code(starts[0]), len(starts)
+        code, count = machine_code(starts[0], waits=waits), len(starts)
         self._words = np.zeros(count * code.layout.words, dtype=np.int64)
         each = []
         for start, words in zip(starts, self._words.reshape(count, -1), strict=True):
-            block = MemoryBlock(code.layout, arguments_of(start), words=words)
+            block = MemoryBlock(code.layout, arguments_of(start, waits=waits), words=words)
             made = block.contents
             block.update(made)  # numbers; there are no columns
             run = functools.partial(code.one, block.address)
@@ -209,28 +231,31 @@ def _across(words: Any, count: int, array: Any) -> Any:
     return blocks[:, place : place + array.size].T
 
 
-_known: dict[int, tuple[MachineCode, Any]] = {}
+_known: dict[Any, tuple[MachineCode, Any]] = {}
 
 
-def machine_code(start: Problem) -> MachineCode:
+def machine_code(start: Problem, *, waits: bool = False) -> MachineCode:
     """Return the steps of a system as machine code."""
     from integrators.runners import compiled as machine
 
     compiled.check_llvmlite()
     program = start.program
-    key = id(program.functions)
+    key = id(program.functions), id(start.options.method), waits
     made = _known.get(key, (None, None))[0]
     if made is None:
         if len(_known) >= compiled.MOST_ENGINES:
             _known.clear()
         made = machine.stepper(
-            compiled.text_of(program), arguments_of(start), compiled.store(), compiled.notify
+            compiled.text_of(program),
+            arguments_of(start, waits=waits),
+            compiled.store(),
+            compiled.notify,
         )
         _known[key] = made, program.functions  # kept, so that their `id` stays theirs
     return made
 
 
-def arguments_of(start: Problem) -> Any:
+def arguments_of(start: Problem, *, waits: bool = False) -> Any:
     """Return the arguments of `integrators.runners.stepping.step_to`, made of lists."""
     from integrators.runners.compiled import StepArguments
 
@@ -239,5 +264,5 @@ def arguments_of(start: Problem) -> Any:
     return StepArguments(
         Functions(made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p),
         Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
-        *prepared(start),
+        *prepared(start, waits=waits),
     )

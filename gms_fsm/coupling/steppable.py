@@ -48,7 +48,7 @@ def start_of(
         signals=signals,
     )
     chosen = Settings(rtol=rtol) if settings is None else settings
-    return Problem.of(system, None, end, _usable(chosen, "located"), t_start=t, initial=initial)
+    return Problem.of(system, None, end, usable(chosen, "located"), t_start=t, initial=initial)
 
 
 def start_of_system(
@@ -68,11 +68,11 @@ def start_of_system(
             value = float(np.interp(t, signal.times, signal.values))
             signals[name] = Corners(np.array([t, end]), np.full(2, value), held=True)
     moved = dataclasses.replace(system, signals=signals)
-    chosen = _usable(settings, "located", "held")  # held events are periods of contacts
+    chosen = usable(settings, "located", "held")  # held events are periods of contacts
     return Problem.of(moved, None, end, chosen, t_start=t, initial=initial)
 
 
-def _usable(settings: Settings, *events: str) -> Settings:
+def usable(settings: Settings, *events: str) -> Settings:
     """Return settings for stepping, or refuse."""
     if not isinstance(settings.method, str) or settings.events not in events:
         raise ParameterError(

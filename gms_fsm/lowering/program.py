@@ -34,7 +34,7 @@ from typing import Any
 
 import integrators
 from gms_fsm.charts.parameters import as_floats
-from gms_fsm.errors import SignalError, shown
+from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.language import Binary, Call, Comparison, Requirement, Value, rough_points, spell
 from gms_fsm.lowering.adapting import Adaptive, adaptive
@@ -168,6 +168,13 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
     True
     """
     system = mounted(system, rig).system
+    if system.open:
+        raise ParameterError(
+            f"its inputs {', '.join(system.open)} are not given",
+            place=f"system {system.name!r}",
+            advice=f"simulate(system, t_end, inputs={{{system.open[0]!r}: ...}}), or "
+            "system.with_inputs(...); SystemState takes them sample by sample",
+        )
     shape = _ProgramShape(_key(system), system)
     corners = [s for s in system.signals.values() if isinstance(s, Corners)]
     return dataclasses.replace(

@@ -28,7 +28,7 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.signals import Corners, Formula
+from gms_fsm.systems.signals import REST, Corners, Formula
 from gms_fsm.systems.system import System
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
@@ -206,7 +206,7 @@ class Problem:
             options = replace(options, max_steps=most)
         initial = {} if initial is None else initial
         y, mode = _initial(what, program, t_start, initial)
-        floor = floor_of(program, tolerances, (t_start, last), y, mode)
+        floor = _floor(system, program, tolerances, (t_start, last), y, mode)
         options = replace(options, floor=floor)
         return cls(
             what=what,
@@ -230,7 +230,7 @@ class Problem:
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
         y, _ = _initial(what, program, self.t_start, self.initial)
         span = self.t_start, self.last
-        floor = floor_of(program, tolerances, span, y, self.mode)
+        floor = _floor(what.system, program, tolerances, span, y, self.mode)
         return replace(
             self,
             what=what,
@@ -245,6 +245,24 @@ class Problem:
             ),
             settings={**self.settings, "atol": used},
         )
+
+
+SOON = 1.0  # s: how far a run looks ahead whose inputs come from outside
+
+
+def _floor(
+    system: System,
+    program: Program,
+    tolerances: list[float],
+    span: tuple[float, float],
+    y: list[float],
+    mode: list[int],
+) -> list[float] | None:
+    """Return what `floor_of` does; of a system with inputs what is known without them."""
+    if system.inputs and min(tolerances, default=1.0) == 0.0:
+        calm = replace(system, signals={**system.signals, **dict.fromkeys(system.inputs, REST)})
+        program, span = lower(calm), (span[0], span[0] + SOON)
+    return floor_of(program, tolerances, span, y, mode)
 
 
 def _recorded(chosen: Settings, atol: Setting, t_start: float, t_end: float) -> dict[str, Setting]:

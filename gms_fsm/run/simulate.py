@@ -24,6 +24,7 @@ from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import arguments_of
 from gms_fsm.systems.rigs import Rig
+from gms_fsm.systems.signals import SignalLike
 from gms_fsm.systems.system import System
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.monitors import Monitor, checked, watched
@@ -41,6 +42,7 @@ def simulate(
     *,
     t_start: float = 0.0,
     initial: Mapping[str, Any] | None = None,
+    inputs: Mapping[str, SignalLike] | None = None,
     settings: Settings | None = None,
     engine: str | ElementMachines | None = None,
     machines: ElementMachines | Mapping[str, ElementMachines] | None = None,
@@ -69,6 +71,9 @@ def simulate(
         ``v`` [m/s] (not with a prescribed velocity) and ``x`` [m]. In a system ``"load.x"`` is the
         position of the body load, ``"gear.z"`` and ``"gear.states"`` belong to the contact gear,
         and further states have their names. All else starts at 0.
+    inputs : mapping of str to signal, optional
+        For each input of a system what it is during the run: an expression, ramps, a record, a
+        function; see `System.with_inputs`.
     settings : Settings, optional
         How to integrate and what to record; the defaults if omitted.
     engine : {"machines", "ifelse", "compiled"} or ElementMachines, optional
@@ -138,6 +143,10 @@ def simulate(
     given: SettingOptions = {**options} if engine is None else {**options, "engine": engine}  # type: ignore[typeddict-item]
     chosen = Settings.of(settings, "simulate", **given)
     on, end = arguments_of("simulate", model, rig, t_end)
+    if inputs is not None:
+        if not isinstance(model, System):
+            raise ParameterError("only a system has inputs", place="inputs", value=inputs)
+        model = model.with_inputs(inputs)
     if progress is not None and not callable(progress):
         raise ParameterError(
             "it must be a function of the moment reached", place="progress", value=progress

@@ -119,7 +119,7 @@ def check_springs(system: System) -> None:
 
 def field_of(system: System, index: int, name: str) -> Value:
     """Read a field of a spring; only `rest` may change during a run."""
-    names = [*system.numbers, *(["t", *system.signals] if name == "rest" else [])]
+    names = [*system.numbers, *(["t", *system.given] if name == "rest" else [])]
     try:
         return parse_value(str(getattr(system.springs[index], name)), names)
     except ExpressionError as error:

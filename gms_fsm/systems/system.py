@@ -53,7 +53,7 @@ from gms_fsm.systems.parts import (
 from gms_fsm.systems.reading.kinds import checked_units, in_their_units
 from gms_fsm.systems.reading.texts import texts_of_system
 from gms_fsm.systems.rigs import Rig
-from gms_fsm.systems.signals import Signal, as_signal
+from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring, on_ground
 
 if TYPE_CHECKING:
@@ -99,6 +99,9 @@ class System:
         Functions of time, as those of a rig; texts may use the numbers.
     numbers : mapping of str to float, optional
         Constants.
+    inputs : sequence of str, optional
+        What comes from outside: ``simulate(system, t_end, inputs={"u": signal})`` gives it for a
+        run, `gms_fsm.SystemState` takes it sample by sample. All texts can use it as a signal.
     flow : mapping of str to str, optional
         Further smooth states, each with its time derivative: a current, an integrator.
     sampled : sequence of Sampled, optional
@@ -147,6 +150,7 @@ class System:
     sampled: tuple[Sampled, ...] = field(default=(), kw_only=True)
     let: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     units: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    inputs: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
@@ -177,6 +181,7 @@ class System:
         put(self, "flow", texts_of(self.flow, f"{here}: flow"))
         put(self, "let", texts_of(self.let, f"{here}: let"))
         put(self, "signals", mapping_of(self.signals, f"{here}: signals"))
+        put(self, "inputs", several(self.inputs, str, f"{here}: inputs"))
         self._check_names(here)
         signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
         put(self, "signals", signals)
@@ -213,12 +218,13 @@ class System:
             groups.append(("the period of sampled values", [("period", ())]))
         for i, body in enumerate(self.bodies):
             own: list[tuple[str, Key]] = [(body.x, ("bodies", i, "x"))]
-            if not (body.velocity == body.v and body.v in self.signals):
+            if not (body.velocity == body.v and body.v in self.given):
                 own.append((body.v, ("bodies", i, "v")))
             groups.append((f"body {body.name!r}", own))
         named = {"signal": "signals", "number": "numbers", "flow": "flow", "let": "let"}
         for kind, attribute in named.items():
             groups.append((kind, [(name, (attribute, name)) for name in getattr(self, attribute)]))
+        groups.append(("input", [(name, ("inputs", i)) for i, name in enumerate(self.open)]))
         for i, each in enumerate(self.sampled):
             values: list[tuple[str, Key]] = [
                 (name, ("sampled", i, "updates", name)) for name in each.updates
@@ -338,6 +344,50 @@ class System:
 
     # ------------------------------------------------------------------ queries
     @property
+    def open(self) -> tuple[str, ...]:
+        """The inputs that no signal is given for."""
+        return tuple(name for name in self.inputs if name not in self.signals)
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """The signals, and the inputs that wait for one."""
+        return (*self.signals, *self.open)
+
+    def with_inputs(self, inputs: Mapping[str, SignalLike]) -> System:
+        """Return the same system with signals for inputs.
+
+        Parameters
+        ----------
+        inputs : mapping of str to signal
+            Names of `inputs`; any signal, as in `signals`.
+
+        Returns
+        -------
+        System
+            It runs once all of its inputs are given.
+
+        Raises
+        ------
+        ParameterError, SignalError, ExpressionError
+            If it has no such input, or it is no signal.
+
+        Examples
+        --------
+        >>> from gms_fsm import Body, Contact, System
+        >>> from gms_fsm.charts import CHARTS
+        >>> pad = Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.0})
+        >>> sled = System("sled", bodies=(Body("sled", inertia=2.0, force="u"),), contacts=(pad,),
+        ...               inputs=("u",))
+        >>> sled.open, sled.with_inputs({"u": "2 * t"}).open
+        (('u',), ())
+        """
+        given = mapping_of(inputs, "inputs")
+        for name in given:
+            if name not in self.inputs:
+                raise unknown("input", name, self.inputs, place="inputs")
+        return replace(self, signals={**self.signals, **given})
+
+    @property
     def names(self) -> tuple[str, ...]:
         """All names that its texts can use."""
         moved = (name for body in self.bodies for name in (body.x, body.v))
@@ -345,7 +395,7 @@ class System:
         given = (
             f"{each.name}.{name}" for each in self.supervisors for name in each.chart.force_names
         )
-        every = ("t", *moved, *self.flow, *updated, *self.signals, *self.numbers, *self.let, *given)
+        every = ("t", *moved, *self.flow, *updated, *self.given, *self.numbers, *self.let, *given)
         return tuple(dict.fromkeys(every))
 
     @property

@@ -15,6 +15,7 @@ from integrators.loop import (
     ASK,
     FIRED,
     FIRING,
+    JUMPING,
     PAUSED,
     ROWS,
     SETTLED,
@@ -62,6 +63,10 @@ class Sample:
     """What a call is given, and what it finds."""
 
     end: float  # its time
+    until: float  # where straight lines end, if later
+    given: int  # how many straight lines a call gives
+    waits: bool  # whether what happens just at the end, a tick or a jump, waits for the next call
+    jumps: bool  # whether an input jumps at the end
     wanted: int  # place of the force among the observed values
     mean: bool  # whether the mean is wanted
     resumed: bool  # whether this call continues one that returned FULL_LOG
@@ -88,8 +93,12 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
     motion = ArcMotion(flow_on, margins_on, on, follow_on)
     if not sample.resumed:
         _begin(functions, b, sample)
+    if len(b.plan.jumps) > 0 and sample.jumps:
+        put_jump(b, sample.clocks, sample.end)
     sample.code = 0
     while now.t < end or not (memory.phase == ARC or memory.phase == SETTLED):
+        if sample.waits and memory.phase == JUMPING and b.plan.jumps[memory.jump] >= end:
+            break
         t = now.t
         for j in range(len(now.y)):
             sample.before[j] = now.y[j]
@@ -97,6 +106,8 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
         if len(b.plan.jumps) > 0 and b.plan.jumps[1] <= now.t:
             next_tick(b.plan, sample.clocks)
             memory.jump = 0
+            if sample.jumps:
+                put_jump(b, sample.clocks, sample.end)
         if sample.mean and now.t > t:
             impulse = _impulse(machines, motion, b, sample, t)
             sample.impulse += impulse
@@ -112,6 +123,8 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
         elif event not in (ROWS, FIRING, STOPPED, SLID, PAUSED):
             sample.code = event
             return event
+    if memory.phase == SETTLED and now.seen < now.t:  # what is before the jump has switched
+        memory.phase = JUMPING
     look(observe, on, now.t, now.y, now.mode, sample.seen)
     sample.force = sample.seen[sample.wanted]
     return 0
@@ -134,6 +147,21 @@ def next_tick(plan: RunPlan, clocks: Clocks) -> None:
     # A step that ends on a jump would see the value after it: stop one clock tick before.
     plan.before_jumps[0] = plan.before_jumps[1]
     plan.before_jumps[1] = math.nextafter(t, -INFINITY)
+
+
+def put_jump(b: Buffers, clocks: Clocks, t: float) -> None:
+    """Put a jump before the next tick into the plan, if the time is before it."""
+    plan, now, memory = b.plan, b.now, b.memory
+    if now.t < t and t < plan.jumps[1]:
+        for i in range(len(clocks.made)):
+            if plan.ticks[1] & (1 << i):
+                clocks.made[i] -= 1  # it will be the next one again
+        plan.jumps[1] = t
+        plan.ticks[1] = 0
+        plan.before_jumps[1] = math.nextafter(t, -INFINITY)
+        if memory.phase == ARC:
+            now.seen = plan.before_jumps[1]
+            now.t_stop = t
 
 
 def _due(clocks: Clocks, i: int) -> float:
@@ -161,21 +189,29 @@ def _begin(functions: Functions, b: Buffers, sample: Sample) -> None:
     """Write the straight lines; where an input jumps or an event waits, guards are asked again."""
     now, memory, end = b.now, b.memory, sample.end
     _shared, _own, tables = functions.p
-    first = 1 if now.t >= end else 0  # of a sample without length only its end matters
+    start = now.t
+    if memory.phase == JUMPING:  # the last sample has waited
+        start = b.plan.jumps[memory.jump]
+    first = 1 if start >= end else 0  # of a sample without length only its end matters
     on, jumps = Held(functions, now.held, b.sliding), False
-    for k in range(len(tables) // 2):
-        jumps = jumps or tables[2 * k + 1][1] != sample.inputs[k][first]
+    for k in range(sample.given):
+        last = len(tables[2 * k]) - 1
+        jumps = jumps or tables[2 * k + 1][last] != sample.inputs[k][first]
     for place in sample.events:
         jumps = jumps or now.y[place] != 0.0
-    jumps = jumps and memory.phase != START
+    jumps = jumps and memory.phase != START and memory.phase != JUMPING
     if jumps:
         look_back(on, now, b.relations)
-    for k in range(len(tables) // 2):
+    for k in range(sample.given):
         times, values, given = tables[2 * k], tables[2 * k + 1], sample.inputs[k]
-        times[0] = now.t
-        times[1] = end
-        values[0] = given[0]
-        values[1] = given[1]
+        last = len(times) - 1
+        # With three corners what was before stays: the loop looks back at it.
+        values[0] = values[last]
+        times[0] = start
+        values[last - 1] = given[0]
+        times[last - 1] = start
+        values[last] = given[1]
+        times[last] = max(end, sample.until)
     if jumps:
         memory.phase = ASK
         let_go(on, now, b.relations)

@@ -305,6 +305,7 @@ class SystemTable(Table):
     name: str
     numbers: dict[str, float] = Field({}, description="parameters that texts name")
     signals: dict[str, SignalField] = Field({})
+    inputs: list[str] = Field([], description="signals that come from outside")
     flow: dict[str, Value] = Field({})
     let: dict[str, Value] = Field({}, description="named expressions that texts can use")
     units: dict[str, str] = Field({}, description="SI units of numbers, such as m/rad")
@@ -336,6 +337,7 @@ def plain(system: System) -> dict[str, Any]:
         "name": system.name,
         "numbers": dict(system.numbers),
         "signals": {name: signal_table(signal) for name, signal in system.signals.items()},
+        "inputs": [*system.inputs],
         "flow": dict(system.flow),
         "let": dict(system.let),
         "units": dict(system.units),
@@ -394,6 +396,7 @@ def system_from(
             for name, each in table.signals.items()
         },
         numbers=table.numbers,
+        inputs=tuple(table.inputs),
         flow=table.flow,  # type: ignore[arg-type]  # numbers become texts there
         let=table.let,  # type: ignore[arg-type]
         units=table.units,

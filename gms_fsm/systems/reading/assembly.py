@@ -33,7 +33,7 @@ from gms_fsm.systems.parts import COUNTS, LEAST_LOAD, LOAD, Body, Contact
 from gms_fsm.systems.reading.definitions import ContactEdge, Definition
 from gms_fsm.systems.reading.order import check_loops, in_order
 from gms_fsm.systems.reading.values import numbers_of, of
-from gms_fsm.systems.signals import Formula
+from gms_fsm.systems.signals import REST, Formula
 from gms_fsm.systems.springs import added, spring_forces
 
 if TYPE_CHECKING:
@@ -303,7 +303,8 @@ class SystemReader:
             else:
                 formula = signal.tree if isinstance(signal, Formula) else None
                 self.definitions.append(Definition(name, formula, signal=signal))
-        given = ["t", *system.signals, *numbers]
+        self.definitions += [Definition(name, None, signal=REST) for name in system.open]
+        given = ["t", *system.given, *numbers]
         self.see_machines()
         forces, inertias = {}, {}
         for i, body in enumerate(system.bodies):
@@ -313,7 +314,7 @@ class SystemReader:
                 forces[body.name] = self.value(body.force, self.names, owner.of("force", "force"))
                 tree = self.value(body.inertia, self.names, owner.of("inertia", "inertia"))
                 inertias[body.name] = tree
-            elif not (body.velocity == body.v and body.v in system.signals):
+            elif not (body.velocity == body.v and body.v in system.given):
                 tree = self.value(body.velocity, given, owner.of("velocity", "velocity"))
                 self.definitions.append(Definition(body.v, tree))
         lets = dict.fromkeys(system.let)

@@ -45,6 +45,7 @@ def texts_of_system(system: System) -> tuple[Any, ...]:
         tuple(system.flow.items()),
         tuple(system.let.items()),
         tuple(sampled),
+        system.open,
     )
 
 

@@ -1,0 +1,338 @@
+"""A whole system in a loop of one's own: it is given its inputs, and steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any, Unpack
+
+from gms_fsm.charts.parameters import checked_scalar
+from gms_fsm.coupling.joints import Snapshot, checked_engine, in_use, too_late
+from gms_fsm.coupling.plant import Plant, SystemSwitch
+from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import checked_kind, refusing
+from gms_fsm.run.problem import LATEST
+from gms_fsm.run.settings import RunOptions, Settings
+from gms_fsm.systems.system import System
+
+__all__ = ["SystemState", "SystemSwitch"]
+
+
+@refusing(quick=("advance", "advance_to", "peek", "value"))
+class SystemState:
+    """A system, advanced by a loop that gives its inputs.
+
+    In each sample an input is held, or a straight line; every switch within is located. The result
+    is that of `simulate` with the same inputs as records, to the last bit. What happens just at the
+    end of a sample, such as the tick of a sampler, belongs to the next one, which may bring other
+    inputs. One thread at a time may call it.
+
+    Parameters
+    ----------
+    system : System
+        With ``inputs=(...)``; its own signals are expressions in t, or constants.
+    t : float
+        s: the beginning.
+    initial : mapping, optional
+        As for `gms_fsm.simulate`.
+    settings : Settings, optional
+        How to integrate; a method of gms-fsm that locates switches.
+    engine : {"compiled", "ifelse"}, optional
+        As for `gms_fsm.FrictionState`.
+    **options
+        Fields of `Settings` by name, such as ``rtol``.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be stepped, or an argument violates its rule.
+
+    Notes
+    -----
+    A formula in t that rests and then moves is looked at by a run before it begins; here steps just
+    end with the samples.
+
+    Examples
+    --------
+    >>> from gms_fsm import Body, Contact, System, simulate
+    >>> from gms_fsm.charts import CHARTS
+    >>> pad = Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.0})
+    >>> sled = System("sled", bodies=(Body("sled", inertia=2.0, force="u"),), contacts=(pad,),
+    ...               inputs=("u",))
+    >>> state = SystemState(sled)
+    >>> state.advance(1.0, u=(0.0, 2.0))
+    >>> state.switches[0].edge, state.value("sled.v") == state.value("v")
+    ('break_away_forward', True)
+    >>> trace = simulate(sled, 1.0, inputs={"u": ([0, 1], [0, 2])})
+    >>> state.value("v") == trace.body("sled").v[-1]
+    True
+    """
+
+    def __init__(
+        self,
+        system: System,
+        *,
+        t: float = 0.0,
+        initial: Mapping[str, Any] | None = None,
+        settings: Settings | None = None,
+        engine: str | None = None,
+        **options: Unpack[RunOptions],
+    ) -> None:
+        checked_kind("system", system, System, "a System")
+        chosen = Settings.of(settings, "SystemState", **options)
+        self._plant = Plant(system, t, initial, chosen, checked_engine(engine))
+        self._names = system.inputs
+
+    def __repr__(self) -> str:
+        return f"<SystemState of {self.system!r} at t = {self.t!r} s>"
+
+    @property
+    def system(self) -> System:
+        """The system, as given."""
+        return self._plant.system
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """What each call needs to be given."""
+        return self._names
+
+    # ------------------------------------------------------------------ steps
+    def advance(self, dt: float, **inputs: Any) -> None:
+        """Advance by a sample.
+
+        Parameters
+        ----------
+        dt : float
+            s, >= 0. With 0 the inputs jump to their values, and what that switches does.
+        **inputs : float or (float, float)
+            Each input: held, or its values at the start and at the end of a straight line. If it
+            does not start where the last sample ended, it jumps.
+
+        Raises
+        ------
+        ParameterError
+            If a number is not finite, an input is missing, the clock does not resolve dt, or
+            another thread's call is under way.
+        SimulationError
+            If it cannot continue. In both cases the system is as it was before.
+        """
+        plant = self._plant
+        if not plant.alone.acquire(False):  # as `with`, in a third of the time
+            raise in_use()
+        try:
+            plant.commit(self._end(dt), self._lines(inputs))
+        finally:
+            plant.alone.leave()
+
+    def advance_to(self, t: float, **inputs: Any) -> None:
+        """Advance to a time; see `advance`.
+
+        Parameters
+        ----------
+        t : float
+            s: not before the present time.
+        **inputs
+            As in `advance`.
+
+        Raises
+        ------
+        ParameterError, SimulationError
+            As in `advance`, or if t is before the present time.
+        """
+        plant = self._plant
+        with plant.alone:
+            end = checked_scalar("t", t, "finite")
+            if end < plant.now.t:
+                raise ParameterError(
+                    f"it is before the present time {plant.now.t!r} s",
+                    place="t",
+                    value=end,
+                    advice="restore a snapshot to go back",
+                )
+            if end > LATEST:
+                raise too_late(end)
+            plant.commit(end, self._lines(inputs))
+
+    def peek(self, dt: float, *names: str, **inputs: Any) -> tuple[float, ...]:
+        """Return values that there would be after a sample, and stay.
+
+        Parameters
+        ----------
+        dt : float
+            As in `advance`.
+        *names : str
+            As in `value`.
+        **inputs
+            As in `advance`.
+
+        Returns
+        -------
+        tuple of float
+            One for each name.
+
+        Raises
+        ------
+        ParameterError, SimulationError
+            As in `advance` and `value`.
+        """
+        plant = self._plant
+        with plant.alone:
+            return tuple(plant.peek(self._end(dt), self._lines(inputs), names))
+
+    def send(self, event: str) -> None:
+        """Send an event: edges that wait for it are asked at the beginning of the next sample.
+
+        Parameters
+        ----------
+        event : str
+            One that a chart waits for.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such event.
+        """
+        with self._plant.alone:
+            self._plant.send(event)
+
+    def _end(self, dt: Any) -> float:
+        """Return the end of a sample."""
+        if type(dt) is not float or not 0.0 <= dt < LATEST:
+            dt = checked_scalar("dt", dt, ">= 0")
+        now = self._plant.now.t
+        end: float = now + dt
+        if end == now and dt > 0.0:
+            raise ParameterError(
+                f"it is below the resolution of the clock at t = {now!r} s",
+                place="dt",
+                value=dt,
+                advice="start at a smaller t=...",
+            )
+        if end > LATEST:
+            raise too_late(end)
+        return end
+
+    def _lines(self, inputs: Mapping[str, Any]) -> list[float]:
+        """Return each input at the start and at the end of a sample, or refuse them."""
+        names, lines = self._names, list[float]()
+        if len(inputs) != len(names):
+            raise self._others(inputs)
+        for name in names:
+            if name not in inputs:
+                raise self._others(inputs)
+            given = inputs[name]
+            if type(given) is float and isfinite(given):
+                lines += given, given
+            else:
+                lines += _line(name, given)
+        return lines
+
+    def _others(self, inputs: Mapping[str, Any]) -> ParameterError:
+        names = self._names
+        return ParameterError(
+            f"the inputs given are {', '.join(sorted(inputs)) or 'none'}",
+            place=f"system {self.system.name!r}",
+            advice=f"give {', '.join(f'{name}=...' for name in names)}"
+            if names
+            else 'it has none: System(..., inputs=("u",)) names them',
+        )
+
+    # ------------------------------------------------------------------ what it found
+    @property
+    def t(self) -> float:
+        """The present time, s."""
+        return self._plant.now.t
+
+    def value(self, name: str) -> float:
+        """Return the present value of a name.
+
+        Parameters
+        ----------
+        name : str
+            Any that a condition over a run may read: ``x`` of a body, ``"load.v"``,
+            ``"pad.F"``, ``"pad.z1"``, a flow, a sampled value, an input, a number, a let.
+
+        Returns
+        -------
+        float
+            Just before what happens at this time.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such name.
+        """
+        return self._plant.value(name)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that `value` knows."""
+        return tuple(self._plant.names)
+
+    @property
+    def states(self) -> dict[str, tuple[str, ...]]:
+        """Of each contact and supervisor the state of each element."""
+        return self._plant.states
+
+    @property
+    def switches(self) -> tuple[SystemSwitch, ...]:
+        """The edges taken in the last sample."""
+        return (*self._plant.now.lost, *self._plant.logged)
+
+    # ------------------------------------------------------------------ going back
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how to make a copy: memory of machine code is not copied."""
+        plant = self._plant
+        with plant.alone:
+            given = (plant.system, plant.t_start, plant.initial, plant.settings, plant.engine)
+            return _made_again, (*given, plant.packed())
+
+    def snapshot(self) -> Snapshot:
+        """Return the present state, to return to it with `restore`.
+
+        Returns
+        -------
+        Snapshot
+            For this system, or another one with the same numbers and engine.
+        """
+        with self._plant.alone:
+            return self._plant.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Return to a snapshot.
+
+        Parameters
+        ----------
+        snapshot : Snapshot
+            From `snapshot`, of this system or another one with the same numbers and engine.
+
+        Raises
+        ------
+        ParameterError
+            If it is of another system; the state stays as it was.
+        """
+        with self._plant.alone:
+            self._plant.restore(snapshot)
+
+
+def _made_again(
+    system: System, t: float, initial: Any, settings: Settings, engine: str, packed: Any
+) -> SystemState:
+    """Return a copy of a `SystemState`, also in another process."""
+    new = SystemState(system, t=t, initial=initial, settings=settings, engine=engine)
+    new._plant.unpack(packed)
+    return new
+
+
+def _line(name: str, given: Any) -> tuple[float, float]:
+    """Return an input at the start and at the end of a sample, or refuse it."""
+    if isinstance(given, tuple | list) and len(given) == 2:
+        return checked_scalar(name, given[0], "finite"), checked_scalar(name, given[1], "finite")
+    if isinstance(given, tuple | list):
+        raise ParameterError(
+            "it must be a number, or a pair: its value at the start and at the end",
+            place=name,
+            value=given,
+        )
+    held = checked_scalar(name, given, "finite")
+    return held, held
