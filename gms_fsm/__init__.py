@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from gms_fsm.identification.excite import excite as excite
     from gms_fsm.identification.fit import fit as fit
     from gms_fsm.identification.result import Fit as Fit
+    from gms_fsm.linear.describing import describing_function as describing_function
+    from gms_fsm.linear.linearize import linearize as linearize
     from gms_fsm.phenomena.measure import Bench as Bench
     from gms_fsm.phenomena.measure import PhenomenaTable as PhenomenaTable
     from gms_fsm.phenomena.measure import measure_phenomena as measure_phenomena
@@ -113,6 +115,8 @@ _HOMES = {
     "identification.excite": "excite",
     "identification.fit": "fit",
     "identification.result": "Fit",
+    "linear.describing": "describing_function",
+    "linear.linearize": "linearize",
     "verification.prove": "Finding Report prove",
     "session.coverage": "coverage",
     "session.session": "Session",

@@ -61,12 +61,14 @@ from gms_fsm import (
     Transition,
     choose,
     coverage,
+    describing_function,
     diff,
     excite,
     export,
     fit,
     generate,
     initial_bank,
+    linearize,
     measure_phenomena,
     prove,
     simulate,
@@ -2228,6 +2230,27 @@ def two_times() -> None:
     bank.from_array(np.concatenate([now[: now.size // 2], bank.to_array()[now.size // 2 :]]))
 
 
+SAMPLED_PAD = System(
+    "ticking", bodies=(Body("mass", inertia=1.0),), contacts=(Contact("pad", GIVEN, period=0.1),)
+)
+rows = {
+    "number": ("trace", 3, lambda: linearize(3, 1.0)),
+    "time after the run": ("t", 2.5, lambda: linearize(ran(), 2.5)),
+    "unknown input": ("inputs", ..., lambda: linearize(ran(), 1.0, inputs="u")),
+    "input that is no name": ("inputs", 3, lambda: linearize(ran(), 1.0, inputs=3)),
+    "contact with a period": (
+        "contact 'pad'", ..., lambda: linearize(simulate(SAMPLED_PAD, 1.0), 0.5)),
+    "amplitude": ("amplitude", 0.0, lambda: describing_function(GIVEN, [1.0, 0.0], 1.0)),
+    "frequency": ("omega", -1.0, lambda: describing_function(GIVEN, 1.0, -1.0)),
+    "friction with an input": ("input", "v", lambda: describing_function(GIVEN, 1, 1, input="v")),
+    "friction that locks": (
+        "chart 'Coulomb friction with stiction'", ...,
+        lambda: describing_function(placed("stiction"), 1, 1)),
+    "system without an input": ("input", ..., lambda: describing_function(SAMPLED_PAD, 1, 1)),
+    "input that the system has not": (
+        "", ..., lambda: describing_function(SAMPLED_PAD, 1, 1, input="u", output="x")),
+}  # fmt: skip
+group("linear answer", ParameterError, called, rows)
 locks = ("stiction", "karnopp", "modelica", "dog-clutch", "end-stop")
 rows = {
     "number": ("model_or_contact", 3, lambda: FrictionState(3)),

@@ -1,4 +1,4 @@
-"""Friction as a discrete-time system of python-control."""
+"""Friction in python-control: as a discrete-time system, and a run's linear system."""
 
 from __future__ import annotations
 
@@ -11,11 +11,52 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.coupling.stepping import FrictionState
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.foundation.extras import require
+from gms_fsm.linear.linearize import LinearSystem
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
-__all__ = ["friction_system"]
+__all__ = ["friction_system", "state_space"]
+
+
+def state_space(linear: LinearSystem, *, name: str = "plant") -> Any:
+    """Return what `gms_fsm.linearize` found as a system of python-control.
+
+    Parameters
+    ----------
+    linear : LinearSystem
+        From `gms_fsm.linearize`.
+    name : str
+        Of the system.
+
+    Returns
+    -------
+    control.StateSpace
+        With the names of states, inputs and outputs; a point in a name becomes an underscore,
+        because python-control separates systems and signals by points.
+
+    Raises
+    ------
+    MissingExtraError
+        If python-control is not installed.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, Slider, linearize, simulate
+    >>> model = GMS(GMSParameters.paper("non-drifting"), law="signed")
+    >>> linear = linearize(simulate(model, Slider(1.0, "0.1*t"), 1.0), 1.0)
+    >>> plant = state_space(linear)
+    >>> plant.input_labels, [f"{w:.2f}" for w in plant.damp()[0]]
+    (['F_a'], ['10.54', '10.54'])
+    """
+    control = require("control", "control")
+    checked_kind("linear", linear, LinearSystem, "what linearize returns")
+    labels = {
+        each: [label.replace(".", "_") for label in getattr(linear, each)]
+        for each in ("states", "inputs", "outputs")
+    }
+    return control.ss(*linear, name=name, **labels)
 
 
 def friction_system(

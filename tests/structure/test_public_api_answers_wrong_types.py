@@ -254,6 +254,7 @@ def _by_entry() -> dict[str, dict[str, Any]]:
         "animate": {"path": Path("a.gif"), "frames": 2},
         "chart_diff": {"a": MODEL.chart, "b": MODEL.chart},
         "choose": {"candidates": {"bank": (MODEL, ["k"])}, "fold": "cycles", "cycles": 5.0},
+        "describing_function": {"friction_or_system": MODEL, "amplitude": 0.1, "omega": 1.0},
         "diff": {"a": MODEL, "b": MODEL},
         "explore": {"initial": None, "settings": None, "t_start": 0.0, "t_end": 1.0}
         | {"sliders": {"v_c": (1e-9, 2.0)}},

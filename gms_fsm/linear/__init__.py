@@ -1,0 +1,1 @@
+"""Linear answers about systems with friction: state space at a time, describing functions."""
