@@ -51,7 +51,7 @@ int main(void)
     return 0;
 }}
 """
-ENGINE = "if ({name}_advance(&s, v[k], v[k + 1], 1e-3)) return 2; F += s.F;"
+ENGINE = "if ({name}_advance(&s, v[k], v[k + 1], 1e-3, {name}_MAX_STEPS)) return 2; F += s.F;"
 PLAIN = "F += {name}_step(&s, v[k], 1e-3);"
 
 

@@ -6,6 +6,7 @@ The steps are `integrators.runners.stepping.step_to`, translated; there is no ru
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,20 +17,36 @@ from gms_fsm._version import __version__
 from gms_fsm.charts.nesting import spelled
 from gms_fsm.coupling.joint import FAILURES
 from gms_fsm.coupling.memory import MOST_SWITCHES
-from gms_fsm.exporters._adapting import STEPS, check_first_call, step_arguments, translate, word_of
+from gms_fsm.exporters._adapting import (
+    PLACES,
+    STEPS,
+    check_first_call,
+    step_arguments,
+    translate,
+    word_of,
+)
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import C_WORDS
 from gms_fsm.foundation.text import visible
 from gms_fsm.run.problem import LATEST, Problem
-from integrators.machine_code.c99 import c99_text, number_text
+from integrators.loop import TOO_MANY_STEPS
+from integrators.machine_code.c99 import number_text
+from integrators.machine_code.c_records import CBlock, records_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout, MemoryBlock
+from integrators.machine_code.possible import BlockStart
+from integrators.machine_code.simplified import simplified
 from integrators.runners.compiled import INLINE
 from integrators.runners.stepping import FULL_LOG
 
-FIELDS = ("t", "switches", "logged", "word")  # of the struct
+FIELDS = ("t", "switches", "logged", "engine")  # of the struct
+# Numbers of the block that the functions beside the engine write.
+GIVEN = (
+    "sample.end", "sample.resumed", "sample.switches", "buffers.plan.max_steps",
+    "buffers.plan.control.time_scale", "sample.inputs",
+)  # fmt: skip
 TEMPLATES = Path(__file__).parent / "_templates"
 TAKES = ("initial", "t_start", "settings")  # what the engine uses
 WORDS = C_WORDS | {*FIELDS, "INFINITY", "NAN", "NULL"}
@@ -90,7 +107,8 @@ def engine_of(subject: Subject) -> CEngine:
     outputs, parameters = outputs_of(start, alone, WORDS), parameters_of(start, alone, WORDS)
     made = CEngine(subject.name, "", "", subject.inputs, outputs, parameters, states, edges)
     text = _Text(made, start, subject.title)
-    return replace(made, header=text.header(), source=text.source())
+    source = text.source()
+    return replace(made, header=text.header(), source=source)
 
 
 class _Text:
@@ -99,9 +117,11 @@ class _Text:
     def __init__(self, made: CEngine, start: Problem, title: str) -> None:
         self.made, self.start, self.title, self.name = made, start, title, made.name
         self.arguments, self.layout = step_arguments(start)
+        parts, outer = {"p": ("shared", "own", "inputs")}, ("functions", "buffers")
+        self.block = CBlock(f"{self.name}_engine", self.layout, parts, outer)
 
     def header(self) -> str:
-        """Return the header."""
+        """Return the header, with the members of the engine that its text reads."""
         name, made = self.name, self.made
         fields = [
             _field(each, "int64_t" if each.place == "mode" else "double") for each in made.outputs
@@ -122,7 +142,8 @@ class _Text:
             inputs=", ".join(made.inputs) or "none",
             fields="\n".join(fields),
             log_length=MOST_SWITCHES,
-            words=self.layout.words,
+            engine=self.block.declared(),
+            max_steps=self.start.options.max_steps,
             bad_argument=BAD_ARGUMENT,
             codes=_closed(codes),
             parameters=_enumeration(PARAMETERS, places),
@@ -137,15 +158,19 @@ class _Text:
     def source(self) -> str:
         """Return the source."""
         name, made, place = self.name, self.made, self.layout.offset
+        text = self.block.text
+        engine, shown = self._translated(), self._shown()
         given = [
-            f"    w[{place('sample.inputs') + 2 * k + j}].f = {each}{j};"
+            f"    {text(place('sample.inputs') + 2 * k + j)} = {each}{j};"
             for k, each in enumerate(made.inputs)
             for j in (0, 1)
         ]
-        spans = [
-            f"(parameter >= {first} && parameter < {first + length})"
-            for first, length in self._spans()
-        ]
+        found, put = [], []
+        for first, length in self._spans():
+            test = f"    if (parameter >= {first} && parameter < {first + length})\n        "
+            number = text(first, index=f"parameter - {first}" if first else "parameter")
+            found.append(f"{test}return &{number};")
+            put.append(f"{test}{number} = value;")
         messages = [
             f'    case {name}_{kind}: return "{_REASONS[code]}";' for code, kind in _codes()
         ]
@@ -157,78 +182,112 @@ class _Text:
             name=name,
             title=safe(self.title),
             version=__version__,
-            engine=self._translated(),
-            clock=place("buffers.now.t"),
-            shown=self._shown(),
-            image=image_of(self.layout, self.arguments),
+            engine=engine,
+            clock=text(place("buffers.now.t")),
+            shown=shown,
+            most=text(place("buffers.plan.max_steps")),
             lines=made.lines,
             names="".join(f"{each}0, {each}1, " for each in made.inputs),
             unless_numbers="".join(
                 f"!is_number({each}{k}) || " for each in made.inputs for k in (0, 1)
             ),
             latest=repr(LATEST),
-            end=place("sample.end"),
+            end=text(place("sample.end")),
             given="\n".join(given),
-            resumed=place("sample.resumed"),
-            switches=place("sample.switches"),
+            resumed=text(place("sample.resumed")),
+            switches=text(place("sample.switches")),
             full_log=FULL_LOG,
-            spans=" || ".join(spans) or "(void)parameter, false",
-            time_scale=place("buffers.plan.control.time_scale"),
-            log_t=place("sample.t"),
-            log_element=place("sample.machine"),
-            log_edge=place("sample.edge"),
+            found="\n".join(found) or "    (void)block;\n    (void)parameter;",
+            set="\n".join(put),
+            time_scale=text(place("buffers.plan.control.time_scale")),
+            log_t=text(place("sample.t"), index="k"),
+            log_element=text(place("sample.machine"), index="k"),
+            log_edge=text(place("sample.edge"), index="k"),
             edge_names="\n".join(edges),
             messages="\n".join(messages),
+            image=_image(self.block, self.arguments),  # of the members that all these use
         )
 
     def _translated(self) -> str:
-        """Return the functions of the integrator and of the system."""
-        translator = Translator(INLINE)
-        translate(translator, self.layout, STEPS)
+        """Return the functions of the integrator and of the system, as far as they are used."""
+        translator, layout = Translator(INLINE), self.layout
+        translate(translator, layout, STEPS)
+        start = start_of(layout, self.arguments)
+        place = layout.offset
+        given = {8 * place(each) for each in GIVEN}
+        given |= {8 * word_of(layout, each) for each in self.made.parameters}
+        kept = {8 * word_of(layout, each) for each in self.made.outputs}
+        kept |= {8 * place(each) for each in ("buffers.now.t", "sample.switches")}
+        module = simplified(translator.module, start, given, kept)
         public = ("init", "advance", "advance_to", "get", "set", "switch", "edge", "message")
-        own = [f"{self.name}_{each}" for each in (*public, "state", "word")]
-        return c99_text(translator.module, [*own, "show", "is_number", "is_parameter"], hidden=True)
+        own = [f"{self.name}_{each}" for each in (*public, "state", "engine")]
+        return records_text(module, self.block, [*own, "show", "is_number", "place_of"])
 
     def _shown(self) -> str:
         lines = []
         for each in self.made.outputs:
-            first, member = word_of(self.layout, each), "i" if each.place == "mode" else "f"
+            first = word_of(self.layout, each)
             if each.length is None:
-                lines.append(f"    s->{each.name} = w[{first}].{member};")
+                lines.append(f"    s->{each.name} = {self.block.text(first)};")
             else:
                 loop = f"for (int k = 0; k < {each.length}; k++)"
-                lines.append(f"    {loop}\n        s->{each.name}[k] = w[{first} + k].{member};")
+                value = self.block.text(first, index="k")
+                lines.append(f"    {loop}\n        s->{each.name}[k] = {value};")
         return "\n".join(lines)
 
     def _spans(self) -> list[tuple[int, int]]:
         """Return where parameters are: first word and length, joined where they touch."""
         spans: list[tuple[int, int]] = []
+        own = self.layout.offset(PLACES["own"])
         for first, length in sorted(
             (word_of(self.layout, p), p.length or 1) for p in self.made.parameters
         ):
-            if spans and sum(spans[-1]) == first:
+            if spans and sum(spans[-1]) == first and first != own:
                 spans[-1] = spans[-1][0], spans[-1][1] + length
             else:
                 spans.append((first, length))
         return spans
 
 
-def image_of(layout: BlockLayout, arguments: Any) -> str:
-    """Return C text that sets all words of a block that are not zero at the start."""
-    names = {offset: name for name, offset in layout.offsets.items()}
+def start_of(layout: BlockLayout, arguments: Any) -> BlockStart:
+    """Return what is in a block at the start."""
+    words = MemoryBlock(layout, arguments).numbers()
+    numbers = [each.offset for each in layout.numbers]
+    numbers += [each.offset for each in layout.arrays if each.shape == ()]
+    rows = {u.offset: math.prod(u.shape) for u in layout.arrays if u.shape and u.kind != "b"}
+    return BlockStart(
+        {8 * k: words[k] for k in numbers},
+        {8 * k: words[k : k + count] for k, count in rows.items()},
+    )
+
+
+def _image(block: CBlock, arguments: Any) -> str:
+    """Return C text that sets all members of a block that are used and not zero at the start."""
     lines = []
-    for k, value in MemoryBlock(layout, arguments).set_words():
-        note = f" /* {names[k]} */" if k in names else ""
-        if isinstance(value, float):
-            lines.append(f"    w[{k}].f = {number_text(value)};{note}")
-        elif isinstance(value, int):
-            lines.append(f"    w[{k}].i = {value};{note}")
+    for k, value in MemoryBlock(block.layout, arguments).set_words():
+        if isinstance(value, list):
+            member = block.place(8 * k, "b")
+            true = (
+                [8 * k + j - member.offset for j, each in enumerate(value) if each]
+                if member
+                else []
+            )
+            pairs = [(member, str(each), "true") for each in true]
         else:
-            lines += [f"    w[{k}].b[{j}] = true;{note}" for j, true in enumerate(value) if true]
+            kind = "f" if isinstance(value, float) else "i"
+            member = block.place(8 * k, kind)
+            number = number_text(value) if isinstance(value, float) else str(value)
+            pairs = [(member, str(k - member.offset // 8), number)] if member else []
+        lines += [
+            f"    {block.entry(member, at, 'block')} = {text};"
+            for member, at, text in pairs
+            if member and member.path in block.used
+        ]
     return "\n".join(lines)
 
 
 _REASONS = {code: reason for code, (_, reason) in FAILURES.items()}
+_REASONS[TOO_MANY_STEPS] = "the call needs more steps than max_steps"
 _KINDS = {
     "LIVELOCK": "LivelockError",
     "STEP_TOO_SMALL": "StepSizeError",

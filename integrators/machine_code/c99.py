@@ -42,9 +42,22 @@ from integrators.machine_code.tree import (
     parts_of,
 )
 
-__all__ = ["CFields", "CNames", "CWriter", "c99_text", "calls", "number_text"]
+__all__ = [
+    "HEAD",
+    "HELPERS",
+    "RESERVED",
+    "TYPES",
+    "CFields",
+    "CNames",
+    "CWriter",
+    "c99_text",
+    "calls",
+    "number_text",
+    "structure_text",
+    "table_text",
+]
 
-_TYPES = {"f": "double", "i": "int64_t", "b": "bool", "p": "char *"}
+TYPES = {"f": "double", "i": "int64_t", "b": "bool", "p": "char *"}
 HEAD = """\
 #include <math.h>
 #include <stdbool.h>
@@ -100,9 +113,9 @@ def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False)
     >>> translator = Translator()
     >>> _ = translator.entry("entry", memory_of, [NumberValue(Local("f", "root"))])
     >>> print(c99_text(translator.module).partition("static double ")[2].strip())
-    memory_of(double root_0)
+    memory_of(double root)
     {
-        return sqrt(max_f(root_0, 0.3));
+        return sqrt(max_f(root, 0.3));
     }
     <BLANKLINE>
     double entry(double root)
@@ -111,7 +124,7 @@ def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False)
     }
     """
     kinds = sorted({f.results for f in module.functions if len(f.results) > 1})
-    parts = [*map(_structure, kinds), *map(_table, module.tables)]
+    parts = [*map(structure_text, kinds), *map(table_text, module.tables)]
     if module.callbacks:
         parts.append(f"double (*callbacks[{module.callbacks}])(double);")
     results = {f.name: f.results for f in module.functions}
@@ -128,12 +141,14 @@ def c99_text(module: Module, taken: Iterable[str] = (), *, hidden: bool = False)
     return "\n".join([HEAD, *used, text])
 
 
-def _structure(kinds: str) -> str:
-    fields = " ".join(f"{_TYPES[kind]} v{k};" for k, kind in enumerate(kinds))
+def structure_text(kinds: str) -> str:
+    """Return the type of several results."""
+    fields = " ".join(f"{TYPES[kind]} v{k};" for k, kind in enumerate(kinds))
     return f"typedef struct {{ {fields} }} many_{kinds};"
 
 
-def _table(table: ConstantTable) -> str:
+def table_text(table: ConstantTable) -> str:
+    """Return a table of constants."""
     entries = textwrap.fill(", ".join(map(number_text, table.values)), 92)
     return f"static const double {table.name}[] = {{\n{textwrap.indent(entries, '    ')}\n}};"
 
@@ -166,7 +181,7 @@ def number_text(value: float) -> str:
 def _result(kinds: str) -> str:
     if len(kinds) > 1:
         return f"many_{kinds}"
-    return _TYPES[kinds] if kinds else "void"
+    return TYPES[kinds] if kinds else "void"
 
 
 class CNames:
@@ -179,7 +194,7 @@ class CNames:
     def __call__(self, name: str) -> str:
         """Return the name of a variable or a function."""
         if name not in self._found:
-            words = re.sub(r"\W+", "_", name).strip("_")
+            words = re.sub(r"\W+", "_", re.sub(r"\.\d+\.$", "", name)).strip("_")
             free = words = f"u{words}" if words[:1].isdigit() else words
             number = 1
             while free in self._taken:
@@ -269,18 +284,19 @@ class CWriter:
     def text(self, *, static: bool) -> str:
         """Return its text."""
         function = self.function
-        names = ", ".join(f"{_TYPES[p.kind]} {self.name(p.name)}" for p in function.parameters)
-        head = "static " if static else ""
+        names = ", ".join(f"{self.declared(p)}{self.name(p.name)}" for p in function.parameters)
+        head = f"{self.heading()}static " if static else ""
         opening = (
             f"{head}{_result(function.results)} {self.functions(function.name)}({names or 'void'})"
         )
         lines = [opening, "{"]
-        for kind in "fibp":
-            used = (v for v in function.variables if v.name not in self.unread)
-            own = [self.name(v.name) for v in used if v.kind == kind]
-            if own:
-                star = ", *" if kind == "p" else ", "
-                lines.append(f"    {_TYPES[kind]} {star.join(own)};".replace("* ", "*"))
+        used = [v for v in function.variables if v.name not in self.unread]
+        for type_ in dict.fromkeys(
+            map(self.declared, sorted(used, key=lambda v: "fibp".find(v.kind)))
+        ):
+            own = [self.name(v.name) for v in used if self.declared(v) == type_]
+            star = ", *" if type_.endswith("*") else ", "
+            lines.append(f"    {type_}{star.join(own)};")
         self.read.clear()
         body = self.block(function.body, 1)
         if body and body[-1] == "    return;":
@@ -288,6 +304,14 @@ class CWriter:
         unused = [p.name for p in function.parameters if p.name not in self.read]
         lines += [f"    (void){self.name(each)};" for each in unused]
         return "\n".join([*lines, *body, "}", ""])
+
+    def declared(self, local: Local) -> str:
+        """Write the type of a local."""
+        return f"{TYPES[local.kind]} ".replace("* ", "*")
+
+    def heading(self) -> str:
+        """Write what stands before a function."""
+        return ""
 
     # ------------------------------------------------------------------ statements
     def block(self, body: Sequence[Statement], depth: int) -> list[str]:
@@ -319,6 +343,9 @@ class CWriter:
                 return [f"{space}{self.value(call)};"]
             case If(test=test, body=body, orelse=orelse):
                 lines = [f"{space}if ({self.value(test)}) {{", *self.block(body, depth + 1)]
+                if len(orelse) == 1 and isinstance(orelse[0], If):
+                    first, *rest = self.statement(orelse[0], depth)
+                    return [*lines, f"{space}}} else {first.strip()}", *rest]
                 if orelse:
                     lines += [f"{space}}} else {{", *self.block(orelse, depth + 1)]
                 return [*lines, f"{space}}}"]
@@ -340,7 +367,10 @@ class CWriter:
                 return [f"{space}return {self.value(value)};"]
             case Return(values=values):
                 parts_text = ", ".join(map(self.value, values))
-                return [f"{space}return (many_{self.function.results}){{{parts_text}}};"]
+                self.counter += 1
+                whole, kind = self.name(f"many.{self.counter}"), f"many_{self.function.results}"
+                made = f"{space}const {kind} {whole} = {{{parts_text}}};"
+                return [made, f"{space}return {whole};"]
         raise AssertionError(statement)
 
     # ------------------------------------------------------------------ expressions
@@ -366,8 +396,8 @@ class CWriter:
                 return f"(char *){name}", _UNARY
             case Load(kind=kind, address=address):
                 return self.place(kind, address), _WHOLE
-            case AddressOf(address=address):
-                return self.address(address)
+            case AddressOf():
+                return self.address_of(expr)
             case Logic(op=op, left=left, right=right):
                 sign, binds = ("&&", 3) if op == "and" else ("||", 2)
                 inner = binds if op == "and" else 3
@@ -405,7 +435,7 @@ class CWriter:
         if op in ("neg", "not"):
             return f"{'-' if op == 'neg' else '!'}{self.value(expr.operands[0], _WHOLE)}", _UNARY
         if op in ("float", "int"):
-            type_ = _TYPES["f" if op == "float" else "i"]
+            type_ = TYPES["f" if op == "float" else "i"]
             return f"({type_}){self.value(expr.operands[0], _UNARY)}", _UNARY
         names = {"abs": "fabs" if kind == "f" else "abs_i", "sqrt": "sqrt", "%": "mod_i"}
         names["copysign"] = "copysign"
@@ -414,15 +444,21 @@ class CWriter:
 
     def place(self, kind: str, address: Address) -> str:
         """Write a place in memory."""
-        type_ = _TYPES[kind] if kind != "p" else "char *"
+        if isinstance(address.base, Global) and address.size == 8:
+            first = address.offset // 8
+            index = "" if address.index is None else self.value(address.index, 8 if first else 0)
+            index = f"{index} + {first}" if index and first else index or str(first)
+            return f"{address.base.name}[{index}]"
+        type_ = TYPES[kind] if kind != "p" else "char *"
         base = self.value(address.base, 8)
         if address.offset or address.name:
             base = f"({base} + {self.field(address)})"
         index = "0" if address.index is None else self.value(address.index)
         return f"(({type_} *){base})[{index}]".replace("* *", "**")
 
-    def address(self, address: Address) -> tuple[str, int]:
+    def address_of(self, expr: AddressOf) -> tuple[str, int]:
         """Write an address."""
+        address = expr.address
         text = self.value(address.base, 8)
         if address.offset:
             text += f" + {address.offset}"

@@ -17,6 +17,7 @@ from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.tree import (
     Address,
+    AddressOf,
     AssignMany,
     Callback,
     Choose,
@@ -87,8 +88,8 @@ def javascript_text(module: Module) -> str:
     >>> _ = translator.entry("entry", memory_of, [NumberValue(Local("f", "root"))])
     >>> print(javascript_text(translator.module).strip())
     function max(a, b) { return b > a ? b : a; }
-    function memory_of(root_0) {
-        return Math.sqrt(max(root_0, 0.3));
+    function memory_of(root) {
+        return Math.sqrt(max(root, 0.3));
     }
     <BLANKLINE>
     function entry(root) {
@@ -245,8 +246,9 @@ class _Script(CWriter):
         index = "" if address.index is None else f" + {self.value(address.index, 9)}"
         return f"B[({first}) * 8{index}]"
 
-    def address(self, address: Address) -> tuple[str, int]:
+    def address_of(self, expr: AddressOf) -> tuple[str, int]:
         """Write an address."""
+        address = expr.address
         if address.size != 8 and address.index is not None:
             raise ValueError(f"JavaScript has no address within a word: {address}")
         return self.words(address), 8

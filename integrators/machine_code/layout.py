@@ -384,6 +384,12 @@ class MemoryBlock:
                 address, _ = array.__array_interface__["data"]
                 words[place.offset : place.offset + 1 + place.lengths] = address, *lengths
 
+    def numbers(self) -> list[Const]:
+        """Return what is in all words; truth values are eight in a word, as an integer."""
+        self.update(self.contents)
+        rows = zip(self.layout.kinds(), self._floats.tolist(), self._words.tolist(), strict=True)
+        return [Const("f", u) if kind == "f" else Const("i", whole) for kind, u, whole in rows]
+
     def set_words(self) -> Iterator[tuple[int, float | int | list[bool]]]:
         """Yield the words that are not zero, without the addresses and lengths of columns.
 

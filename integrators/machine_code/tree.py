@@ -6,6 +6,7 @@ memory) and ``"p"`` (address). Names of locals are unique within a function.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,10 +17,11 @@ SIZES = {"f": 8, "i": 8, "b": 1, "p": 8}  # bytes in memory
 # --------------------------------------------------------------------------- expressions
 @dataclass(frozen=True, eq=False)
 class Const:
-    """A number; equal to others with the same bits."""
+    """A number; equal to others with the same bits. Named constants of Python keep their names."""
 
     kind: str
     value: Any
+    name: str = ""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Const) and self._bits == other._bits
@@ -27,17 +29,21 @@ class Const:
     def __hash__(self) -> int:
         return hash(self._bits)
 
-    @property
+    @functools.cached_property
     def _bits(self) -> tuple[str, str]:
         return self.kind, repr(self.value)  # 0.0 is not -0.0, and NaN is NaN
 
 
 @dataclass(frozen=True)
 class Local:
-    """A variable or parameter of the function."""
+    """A variable or parameter of the function.
+
+    An address says what it leads to: the kind of the entries there, or nothing, to a whole block.
+    """
 
     kind: str
     name: str
+    to: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)
@@ -86,7 +92,8 @@ class Choose:
 class Address:
     """A place in memory: base + offset bytes + index times the size of an entry.
 
-    That of a number of a record has a name, for readers of what is printed.
+    That of a number of a record has a name, for readers of what is printed. In an empty array there
+    is no place: what reads or writes there is never reached.
     """
 
     base: Expr
@@ -94,6 +101,7 @@ class Address:
     index: Expr | None = None
     size: int = 8
     name: str = field(default="", compare=False)
+    empty: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -106,10 +114,11 @@ class Load:
 
 @dataclass(frozen=True)
 class AddressOf:
-    """An address as a value."""
+    """An address as a value, and the kind of the entries there."""
 
     address: Address
     kind: str = "p"
+    to: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)
@@ -140,6 +149,24 @@ class Callback:
 
 
 Expr = Const | Local | Global | Op | Logic | Choose | Load | AddressOf | Invoke | Foreign | Callback
+
+
+def leads_to(expr: Expr) -> str:
+    """Return the kind of the entries that an address leads to; empty for a block.
+
+    Examples
+    --------
+    >>> leads_to(Global("table0")), leads_to(Local("p", "y.0.", "f"))
+    ('f', 'f')
+    """
+    match expr:
+        case Local(to=kind) | AddressOf(to=kind):
+            return kind
+        case Choose(yes=yes):
+            return leads_to(yes)
+        case Global():
+            return "f"
+    return ""
 
 
 def may_write(expr: Expr) -> bool:
@@ -293,6 +320,8 @@ class TypedFunction:
         Whether it can be called from outside.
     inline : bool, optional
         Whether it is put inline; LLVM decides if omitted.
+    about : str
+        What it is for, for readers of what is printed.
     """
 
     name: str
@@ -302,6 +331,7 @@ class TypedFunction:
     body: tuple[Statement, ...]
     entry: bool = False
     inline: bool | None = None
+    about: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)

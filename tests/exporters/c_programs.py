@@ -15,7 +15,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import GMSError, Model, Prescribed, Settings, System, Trace, export, simulate
+from gms_fsm import (
+    FrictionState,
+    GMSError,
+    Model,
+    Prescribed,
+    Settings,
+    System,
+    Trace,
+    export,
+    simulate,
+)
 from gms_fsm.exporters import Subject
 from gms_fsm.exporters._c import CEngine, engine_of
 from gms_fsm.exporters.plain.c import plain_c
@@ -23,7 +33,8 @@ from gms_fsm.run.problem import Problem
 from gms_fsm.systems.signals import Corners
 from tests.exporters.frictions import case
 
-FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wcast-qual", "-Wconversion", "-Werror"]
+FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", *WARNINGS]
 COMPILERS = [each for each in ("gcc", "clang") if shutil.which(each)]
 needs_c = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
 
@@ -153,13 +164,13 @@ class Library:
             kind = kinds[each.place == "mode"]
             fields.append((each.name, kind if each.length is None else kind * each.length))
         fields += [("switches", ctypes.c_int64), ("logged", ctypes.c_int64)]
-        fields.append(("word", ctypes.c_int64 * int(re.search(r"word\[(\d+)\]", made.header)[1])))  # type: ignore[index]
+        fields.append(("engine", ctypes.c_int64 * 8192))  # at least what it takes
         self.State = type("State", (ctypes.Structure,), {"_fields_": fields})
         pointer = ctypes.POINTER(self.State)
         numbers = [ctypes.c_double] * (2 * len(made.inputs) + 1)
         self.init = self._of(found, "init", None, pointer)
-        self.advance = self._of(found, "advance", ctypes.c_int, pointer, *numbers)
-        self.advance_to = self._of(found, "advance_to", ctypes.c_int, pointer, *numbers)
+        limit = ctypes.c_int64
+        self._advance = self._of(found, "advance", ctypes.c_int, pointer, *numbers, limit)
         self.get = self._of(found, "get", ctypes.c_double, pointer, ctypes.c_int)
         self.set = self._of(found, "set", ctypes.c_int, pointer, ctypes.c_int, ctypes.c_double)
         self.message = self._of(found, "message", ctypes.c_char_p, ctypes.c_int)
@@ -168,6 +179,11 @@ class Library:
         function = getattr(found, f"{self.made.name}_{name}")
         function.restype, function.argtypes = result, arguments
         return function
+
+    def advance(self, state: Any, *numbers: float, max_steps: int = 10**6) -> int:
+        """Advance a state."""
+        code: int = self._advance(state, *numbers, max_steps)
+        return code
 
     def begun(self) -> Any:
         """Return a state at the start."""
@@ -180,6 +196,25 @@ class Library:
         found = re.search(rf"_parameter_{name} = (\d+)", self.made.header)
         assert found
         return int(found[1])
+
+
+def random_calls(c: Library, given: Model, count: int, seed: int = 5) -> int:
+    """Assert that random calls have the bits of `FrictionState`; return the switches.
+
+    Velocities of every size, jumps between calls, changes of direction; samples of 0 to 0.1 s.
+    """
+    random = np.random.default_rng(seed)
+    ends = random.normal(size=(count, 2)) * 10.0 ** random.uniform(-6.0, 0.0, size=(count, 1))
+    ends[1:, 0] = np.where(random.random(count - 1) < 0.7, ends[:-1, 1], ends[1:, 0])
+    ends[random.random(count) < 0.1, 1] = 0.0
+    lengths = np.where(random.random(count) < 0.02, 0.0, random.uniform(1e-4, 0.1, size=count))
+    friction, state = FrictionState(given), c.begun()
+    rows = zip(ends[:, 0].tolist(), ends[:, 1].tolist(), lengths.tolist(), strict=True)
+    for k, (v0, v1, dt) in enumerate(rows):
+        assert c.advance(state, v0, v1, dt) == 0, (k, v0, v1, dt)
+        assert friction.advance(v0, v1, dt) == state.F, (k, v0, v1, dt)
+    switches: int = state.switches
+    return switches
 
 
 # --------------------------------------------------------------------------- the plain form

@@ -9,6 +9,7 @@ import ctypes
 import io
 import itertools
 import math
+import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,15 @@ from gms_fsm.charts import CHARTS
 from gms_fsm.exporters import Subject
 from gms_fsm.exporters._c import engine_of
 from gms_fsm.systems.signals import Corners
-from tests.exporters.c_programs import COMPILERS, Library, built, needs_c, same_bits
+from tests.exporters.c_programs import (
+    COMPILERS,
+    WARNINGS,
+    Library,
+    built,
+    needs_c,
+    random_calls,
+    same_bits,
+)
 from tests.exporters.frictions import DENSE, dense
 from tests.helpers import matrix, stick_slip
 
@@ -110,6 +119,40 @@ def test_bad_arguments(numbers: tuple[float, ...], c: Library) -> None:
     assert bytes(state) == before
 
 
+def test_random_calls_have_the_bits_of_the_engine(c: Library) -> None:
+    assert random_calls(c, model(), 10_000) > 500
+
+
+def test_a_limit_of_steps_and_the_state_after_an_error(c: Library) -> None:
+    one, other = c.begun(), c.begun()
+    for v0, v1 in PAIRS:
+        before = bytes(one)
+        code = c.advance(one, v0, v1, 0.1, max_steps=1)
+        if code != 0:
+            assert b"more steps than max_steps" in c.message(code)
+            assert bytes(one) == before
+            assert c.advance(one, v0, v1, 0.1) == 0
+        assert c.advance(other, v0, v1, 0.1) == 0
+        assert bytes(one)[8:] == bytes(other)[8:] or one.F == other.F
+    assert one.F == other.F
+    assert c.advance(one, 0.0, 0.0, 0.1, max_steps=0) == -1
+
+
+def test_what_cannot_happen_is_left_out() -> None:
+    made = engine_of(Subject.of(model(), "c99", name="it"))
+    for word in ("surface", "jumps", "ticks", "events", "impulse", "discrete"):
+        assert word not in made.header
+    assert "block->now.t" in made.source
+    assert "(char *)" not in made.source
+
+
+@pytest.mark.skipif(not shutil.which("g++"), reason="there is no C++ compiler")
+def test_both_forms_are_cpp(tmp_path: Path) -> None:
+    export(stick_slip("signed"), "c99", tmp_path, name="it")
+    command = ["g++", "-x", "c++", "-fsyntax-only", *WARNINGS, "it.c", "it_plain.c"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+
+
 def test_numbers_are_set_and_all_that_follows_from_them(c: Library) -> None:
     """Tolerances and scales, too: the bits are those of a friction that began with the numbers."""
     given = {"F_s": 0.9, "v_s": 5e-3}
@@ -174,7 +217,7 @@ def test_a_broken_record_is_named(tmp_path: Path) -> None:
         "v,t\n0,0\n": "row 1: the columns must be t,v",
         "": "row 1: the columns must be t,v",
         "t,v\n0,0\n1,nan\n": "row 3: an argument is not finite",
-        "t,v\n0,0\n1,0\n0.5,0\n": "row 4: an argument is not finite, or time goes backward",
+        "t,v\n0,0\n1,0\n0.5,0\n": "row 4: an argument is not finite or no limit, or",
     }.items():
         done = subprocess.run([program], input=record, capture_output=True, text=True, check=False)
         assert done.returncode == 1

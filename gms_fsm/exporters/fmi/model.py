@@ -15,14 +15,14 @@ from gms_fsm._version import __version__
 from gms_fsm.coupling.joint import FAILURES
 from gms_fsm.coupling.memory import arguments_of
 from gms_fsm.exporters._adapting import PLACES, STEPS, translate
-from gms_fsm.exporters._c import TEMPLATES, filled, image_of, safe
+from gms_fsm.exporters._c import TEMPLATES, filled, safe
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.fmi.variables import FmuVariable, indicators_of, nominals_of, types_of
 from gms_fsm.lowering.adapting import Adapting
 from gms_fsm.run.recording.following import adapting_of
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.front_end.translate import Translator
-from integrators.machine_code.layout import BlockLayout
+from integrators.machine_code.layout import BlockLayout, MemoryBlock
 from integrators.runners import exchange, stepping
 from integrators.runners.compiled import INLINE, is_known
 from integrators.runners.exchange import Exchange
@@ -101,7 +101,7 @@ class FmuModel:
             version=__version__,
             engine=c99_text(translator.module, [*taken, *self._constants(), *OWN], hidden=True),
             words=self.layout.words,
-            image=image_of(self.layout, self.arguments),
+            image=_image(self.layout, self.arguments),
             time_scale=self.layout.offset("buffers.plan.control.time_scale"),
         )
 
@@ -162,6 +162,21 @@ class FmuModel:
             "SAMPLE_RESUMED": place("sample.resumed"),
             "FULL_LOG": stepping.FULL_LOG,
         }
+
+
+def _image(layout: BlockLayout, arguments: Any) -> str:
+    """Return C text that sets all words of a block that are not zero at the start."""
+    names = {offset: name for name, offset in layout.offsets.items()}
+    lines = []
+    for k, value in MemoryBlock(layout, arguments).set_words():
+        note = f" /* {names[k]} */" if k in names else ""
+        if isinstance(value, float):
+            lines.append(f"    w[{k}].f = {number_text(value)};{note}")
+        elif isinstance(value, int):
+            lines.append(f"    w[{k}].i = {value};{note}")
+        else:
+            lines += [f"    w[{k}].b[{j}] = true;{note}" for j, true in enumerate(value) if true]
+    return "\n".join(lines)
 
 
 def both_of(subject: Subject) -> FmuArguments:

@@ -17,7 +17,7 @@ from integrators.machine_code.front_end.values import (
     Value,
 )
 from integrators.machine_code.front_end.work import Again, Work, as_kind
-from integrators.machine_code.tree import AddressOf, Const, Expr, Local, Return
+from integrators.machine_code.tree import Const, Expr, Local, Return, leads_to
 
 RESULT = "return"  # as a name; no variable can be called so
 
@@ -59,7 +59,7 @@ def _changes(work: Work, path: str, expr: Expr) -> bool:
 def _placed(work: Work, path: str, array: ArrayValue) -> ArrayValue:
     """Return a view whose beginning is in a local variable."""
     dims = _lengths(work, path, array)
-    return ArrayValue(array.kind, dims, work.set(path, AddressOf(array.address)))
+    return ArrayValue(array.kind, dims, work.set(path, array.beginning))
 
 
 def _lengths(work: Work, path: str, array: ArrayValue) -> tuple[Expr, ...]:
@@ -117,7 +117,7 @@ def _returned(work: Work, path: str, value: Value, passed: list[Expr]) -> Value:
     """Return a value in terms of parameters and slots, and append what goes into the slots."""
 
     def slot(path: str, expr: Expr) -> Local:
-        local = work.local(work.slots, path, expr.kind)
+        local = work.local(work.slots, path, expr.kind, leads_to(expr))
         passed.append(as_kind(work, expr, local.kind))
         return local
 
@@ -135,6 +135,6 @@ def _returned(work: Work, path: str, value: Value, passed: list[Expr]) -> Value:
             dims = tuple(lengths)
             place = [value.base] if value.index is None else [value.base, value.index]
             if any(_changes(work, path, each) for each in place):
-                return ArrayValue(value.kind, dims, slot(path, AddressOf(value.address)))
+                return ArrayValue(value.kind, dims, slot(path, value.beginning))
             return replace(value, dims=dims)
     return value

@@ -8,7 +8,7 @@ import math
 import operator
 import types
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from integrators.machine_code.front_end.passing import passed_of
@@ -23,7 +23,6 @@ from integrators.machine_code.front_end.values import (
 )
 from integrators.machine_code.front_end.work import Work, as_kind, common
 from integrators.machine_code.tree import (
-    AddressOf,
     Assign,
     AssignMany,
     Callback,
@@ -166,16 +165,16 @@ def _named(work: Work, name: str) -> Value:
     if name in work.assigned:
         raise work.error(f"{name} is read before it is assigned")
     if name in work.names:
-        return _object(work, work.names[name])
+        return _object(work, work.names[name], name)
     if hasattr(builtins, name):
         return FixedValue(getattr(builtins, name))
     raise work.error(f"{name} is not defined")
 
 
-def _object(work: Work, given: Any) -> Value:
+def _object(work: Work, given: Any, name: str = "") -> Value:
     """Return a Python object as a value."""
     if isinstance(given, bool | int | float):
-        return NumberValue(_constant(given))
+        return NumberValue(replace(_constant(given), name=name))
     if isinstance(given, tuple) and not hasattr(given, "_fields"):
         return work.translator.table(given)
     return FixedValue(given)
@@ -322,7 +321,7 @@ def _choice(work: Work, test: ast.expr, yes: ast.expr, no: ast.expr) -> Value:
         and (a.kind, len(a.dims)) == (b.kind, len(b.dims))
     ):
         chosen = work.kept(chosen)
-        place = Choose("p", chosen, AddressOf(a.address), AddressOf(b.address))
+        place = Choose("p", chosen, a.beginning, b.beginning)
         dims = tuple(
             u if u == v else work.kept(Choose("i", chosen, u, v))
             for u, v in zip(a.dims, b.dims, strict=True)
@@ -417,7 +416,7 @@ def _own_call(work: Work, function: Callable[..., Any], arguments: list[Value]) 
     if isinstance(result, NumberValue):
         return NumberValue(Invoke(slots[0].kind, name, passed))
     given: dict[Local, Expr] = dict(zip(done.function.parameters, passed, strict=True))
-    targets = [work.new(slot.kind) for slot in slots]
+    targets = [work.new(slot.kind, slot.to) for slot in slots]
     given.update(zip(slots, targets, strict=True))
     if not slots:
         work.out.append(Do(Invoke("", name, passed)))

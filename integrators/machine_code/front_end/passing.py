@@ -20,7 +20,7 @@ from integrators.machine_code.front_end.values import (
     substituted,
 )
 from integrators.machine_code.front_end.work import Work
-from integrators.machine_code.tree import AddressOf, Const, Expr, Local, locals_in
+from integrators.machine_code.tree import Const, Expr, Local, locals_in
 
 
 def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
@@ -32,7 +32,7 @@ def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
         """Return an expression in terms of numbered parameters."""
         for each in locals_in(expr):
             if each not in names:
-                names[each] = Local(each.kind, f"a{len(passed)}")
+                names[each] = Local(each.kind, f"a{len(passed)}", each.to)
                 passed.append(each)
         return substituted(expr, names)  # type: ignore[no-any-return]
 
@@ -44,7 +44,7 @@ def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
             case NumberValue(expr=expr):
                 return "number", known(expr)
             case ArrayValue(kind=kind, dims=dims) if direct:
-                passed.append(AddressOf(value.address))
+                passed.append(value.beginning)
                 return "array", kind, len(passed), tuple(map(known, dims))
             case ArrayValue(kind=kind, dims=dims, base=base, offset=offset, index=index):
                 lengths = tuple(map(known, dims))
@@ -66,15 +66,15 @@ def take(work: Work, arguments: Sequence[Value]) -> None:
         raise work.error(f"it takes {len(names)} arguments, not {len(arguments)}")
     known: dict[Local, Expr] = {}
 
-    def parameter(name: str, kind: str) -> Local:
-        local = Local(kind, f"{name}.{len(work.parameters)}.")
+    def parameter(name: str, kind: str, to: str = "") -> Local:
+        local = Local(kind, f"{name}.{len(work.parameters)}.", to)
         work.parameters[local] = None
         return local
 
     def own(expr: Expr, name: str) -> Expr:
         for each in locals_in(expr):
             if each not in known:
-                known[each] = parameter(each.name.partition(".")[0] or name, each.kind)
+                known[each] = parameter(each.name.partition(".")[0] or name, each.kind, each.to)
         return substituted(expr, known)  # type: ignore[no-any-return]
 
     def bound(value: Value, name: str, direct: bool) -> Value:
@@ -84,7 +84,7 @@ def take(work: Work, arguments: Sequence[Value]) -> None:
             case NumberValue(expr=expr):
                 return NumberValue(own(expr, name))
             case ArrayValue(kind=kind, dims=dims) if direct:
-                local = parameter(name, "p")
+                local = parameter(name, "p", kind)
                 return ArrayValue(kind, tuple(own(each, name) for each in dims), local)
             case ArrayValue(dims=dims, base=base, index=index):
                 lengths = tuple(own(each, name) for each in dims)

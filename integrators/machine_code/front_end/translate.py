@@ -208,8 +208,9 @@ class Translator:
         kinds = "".join(slot.kind for slot in slots)
         name = function.__name__.strip("_")
         inline = self.inline.get(function.__name__)
+        about = (function.__doc__ or "").strip().partition("\n")[0]
         made = TypedFunction(
-            name, tuple(work.parameters), kinds, variables, statements, inline=inline
+            name, tuple(work.parameters), kinds, variables, statements, inline=inline, about=about
         )
         # Other types may have led to the same statements.
         alike = self._made.setdefault((id(function), replace(made, body=())), [])

@@ -52,11 +52,18 @@ class ArrayValue:
     offset: int = 0
     index: Expr | None = None
     name: str = field(default="", compare=False)
+    empty: bool = field(default=False, compare=False)  # a row of an array without rows
 
     @property
     def address(self) -> Address:
         """Where it begins."""
-        return Address(self.base, self.offset, self.index, SIZES[self.kind], self.name)
+        size = SIZES[self.kind]
+        return Address(self.base, self.offset, self.index, size, self.name, self.empty)
+
+    @property
+    def beginning(self) -> AddressOf:
+        """Its address as a value."""
+        return AddressOf(self.address, to=self.kind)
 
     def at(self, place: Expr) -> ArrayValue | NumberValue:
         """Return an entry, or a row of a table."""
@@ -68,7 +75,8 @@ class ArrayValue:
             offset += SIZES[self.kind] * step.value
         else:
             index = step if index is None else plus(index, step)
-        row = replace(self, dims=self.dims[1:], offset=offset, index=index)
+        empty = self.empty or self.dims[0] == Const("i", 0)
+        row = replace(self, dims=self.dims[1:], offset=offset, index=index, empty=empty)
         return row if row.dims else NumberValue(Load(self.kind, row.address))
 
 

@@ -19,6 +19,7 @@ from integrators.machine_code.tree import (
     Op,
     Statement,
     TypedFunction,
+    leads_to,
     locals_in,
 )
 
@@ -121,10 +122,10 @@ class Work:
         """Return an error at the present line."""
         return self.source.error(reason, self.node)
 
-    def local(self, table: dict[str, Local], name: str, kind: str) -> Local:
+    def local(self, table: dict[str, Local], name: str, kind: str, to: str = "") -> Local:
         """Return the local of a name; its kind is the widest of all assignments."""
         kind = self.learnt.kinds.get(name, kind)
-        local = table.setdefault(name, Local(kind, name))
+        local = table.setdefault(name, Local(kind, name, to))
         if local.kind != kind:
             if "p" in (local.kind, kind):
                 raise self.error(f"{name} is an array and a number")
@@ -133,13 +134,13 @@ class Work:
                 raise Again
         return local
 
-    def variable(self, name: str, kind: str) -> Local:
+    def variable(self, name: str, kind: str, to: str = "") -> Local:
         """Return the local variable of a name."""
-        return self.local(self.variables, name, kind)
+        return self.local(self.variables, name, kind, to)
 
     def set(self, name: str, expr: Expr) -> Local:
         """Assign a number or an address to a local variable."""
-        local = self.variable(name, expr.kind)
+        local = self.variable(name, expr.kind, leads_to(expr))
         self.out.append(Assign(local, as_kind(self, expr, local.kind)))
         return local
 
@@ -148,15 +149,15 @@ class Work:
         self.temporary += 1
         return f".{self.temporary}"
 
-    def new(self, kind: str) -> Local:
+    def new(self, kind: str, to: str = "") -> Local:
         """Return a new local variable."""
-        return self.variable(self.fresh(), kind)
+        return self.variable(self.fresh(), kind, to)
 
     def kept(self, expr: Expr) -> Expr:
         """Return an expression that keeps its present value."""
         if isinstance(expr, Const | Global) or expr in self.parameters:
             return expr
-        local = self.new(expr.kind)
+        local = self.new(expr.kind, leads_to(expr))
         self.out.append(Assign(local, expr))
         return local
 

@@ -1,4 +1,8 @@
-/* $title; see ${name}.h. Written by gms-fsm $version. */
+/* $title; see ${name}.h. Written by gms-fsm $version.
+ *
+ * First the functions of the system and of the integrator, in the order in which they are needed;
+ * at the end those of the header. What cannot happen to this system has been left out: branches
+ * that are never taken, and members of ${name}_engine that nothing reads. */
 #include "${name}.h"
 
 #include <string.h>
@@ -11,75 +15,86 @@ static bool is_number(double u)
 /* Copy what is public. */
 static void show(${name}_state *s)
 {
-    const ${name}_word *w = s->word;
-    s->t = w[$clock].f;
+    const ${name}_engine *block = &s->engine;
+    s->t = $clock;
 $shown
 }
 
 void ${name}_init(${name}_state *s)
 {
-    ${name}_word *w = s->word;
+    ${name}_engine *block = &s->engine;
     memset(s, 0, sizeof *s);
 $image
     show(s);
 }
 
-int ${name}_advance(${name}_state *s, ${lines}double dt)
+int ${name}_advance(${name}_state *s, ${lines}double dt, int64_t max_steps)
 {
     if (!(dt >= 0.0) || (dt > 0.0 && s->t + dt == s->t))
         return ${name}_BAD_ARGUMENT;
-    return ${name}_advance_to(s, ${names}s->t + dt);
+    return ${name}_advance_to(s, ${names}s->t + dt, max_steps);
 }
 
-int ${name}_advance_to(${name}_state *s, ${lines}double t)
+int ${name}_advance_to(${name}_state *s, ${lines}double t, int64_t max_steps)
 {
-    ${name}_word *w = s->word;
-    int64_t code;
-    if (${unless_numbers}!(t >= s->t && t <= $latest))
+    ${name}_engine *block = &s->engine;
+    int64_t code, switches;
+    if (${unless_numbers}!(t >= s->t && t <= $latest) || max_steps < 1)
         return ${name}_BAD_ARGUMENT;
-    w[$end].f = t;
+    const ${name}_engine before = s->engine;
+    $end = t;
+    $most = max_steps;
 $given
-    w[$resumed].i = 0;
-    code = step((char *)w);
-    s->switches += w[$switches].i;
-    while (code == $full_log) {
-        w[$switches].i = 0;
-        w[$resumed].i = 1;
-        code = step((char *)w);
-        s->switches += w[$switches].i;
+    $resumed = 0;
+    code = step(block);
+    switches = $switches;
+    while (code == $full_log) { /* the log is full: empty it, and go on */
+        $switches = 0;
+        $resumed = 1;
+        code = step(block);
+        switches += $switches;
     }
-    s->logged = w[$switches].i;
+    if (code != ${name}_OK) {
+        s->engine = before;
+        return (int)code;
+    }
+    s->switches += switches;
+    s->logged = $switches;
     show(s);
-    return (int)code;
+    return ${name}_OK;
 }
 
-static bool is_parameter(int parameter)
+/* Return where a parameter is; NULL if there is none. */
+static const double *place_of(const ${name}_engine *block, int parameter)
 {
-    return $spans;
+$found
+    return NULL;
 }
 
 double ${name}_get(const ${name}_state *s, int parameter)
 {
-    return is_parameter(parameter) ? s->word[parameter].f : NAN;
+    const double *place = place_of(&s->engine, parameter);
+    return place ? *place : NAN;
 }
 
 int ${name}_set(${name}_state *s, int parameter, double value)
 {
-    ${name}_word *w = s->word;
-    if (!is_parameter(parameter) || !is_number(value))
+    ${name}_engine *block = &s->engine;
+    if (!place_of(block, parameter) || !is_number(value))
         return ${name}_BAD_ARGUMENT;
-    w[parameter].f = value;
-    w[$time_scale].f = adapt((char *)w);
+$set
+    $time_scale = adapt(block);
     show(s);
     return ${name}_OK;
 }
 
 void ${name}_switch(const ${name}_state *s, int64_t k, double *t, int64_t *element, int64_t *edge)
 {
-    const ${name}_word *w = s->word;
-    *t = w[$log_t + k].f;
-    *element = w[$log_element + k].i;
-    *edge = w[$log_edge + k].i;
+    const ${name}_engine *block = &s->engine;
+    const bool logged = k >= 0 && k < s->logged;
+    *t = logged ? $log_t : NAN;
+    *element = logged ? $log_element : -1;
+    *edge = logged ? $log_edge : -1;
 }
 
 const char *${name}_edge(int64_t edge)
@@ -94,7 +109,7 @@ const char *${name}_message(int code)
 {
     switch (code) {
     case ${name}_OK: return "no error";
-    case ${name}_BAD_ARGUMENT: return "an argument is not finite, or time goes backward";
+    case ${name}_BAD_ARGUMENT: return "an argument is not finite or no limit, or time goes backward";
 $messages
     default: return "unknown error";
     }

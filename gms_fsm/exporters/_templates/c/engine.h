@@ -16,7 +16,8 @@
 extern "C" {
 #endif
 
-typedef union { double f; int64_t i; bool b[8]; } ${name}_word;
+/* Private: what the engine keeps from call to call, and the room that it works in. */
+$engine
 
 typedef struct {
     double t; /* s, the present time */
@@ -24,7 +25,7 @@ $fields
     int64_t switches; /* since ${name}_init */
     int64_t logged;   /* switches in the log: those of the last call, or the last of them if there
                          were $log_length or more */
-    ${name}_word word[$words]; /* private */
+    ${name}_engine engine; /* private */
 } ${name}_state;
 
 /* What the functions return. */
@@ -39,24 +40,29 @@ enum {
 $states
 };
 $edges
+/* A limit of steps for those who need none. */
+enum { ${name}_MAX_STEPS = $max_steps };
+
 /* Begin at t = $t_start s. */
 void ${name}_init(${name}_state *s);
 
 /* Advance by dt >= 0. During the call each input runs on a straight line:$both
  * its value at the start and at the end. With dt = 0 the outputs are those at the end.
- * Returns ${name}_OK. After ${name}_BAD_ARGUMENT nothing has changed; after any other
- * error the state is unusable: keep a copy of the struct if you want to go back. */
-int ${name}_advance(${name}_state *s, ${lines}double dt);
+ * max_steps limits the work: no more steps are attempted than that (between two of them an element
+ * switches at most 100 times), and ${name}_TOO_MANY_STEPS is returned instead.
+ * Returns ${name}_OK, or an error: then the state is what it was before the call. */
+int ${name}_advance(${name}_state *s, ${lines}double dt, int64_t max_steps);
 
 /* The same, to the time t. */
-int ${name}_advance_to(${name}_state *s, ${lines}double t);
+int ${name}_advance_to(${name}_state *s, ${lines}double t, int64_t max_steps);
 
-/* A parameter, by its name above. Tolerances that were not given follow; before the first step
- * initial values that depend on it do, too. */
+/* A parameter, by its name above; NAN for a number that is none. Tolerances that were not given
+ * follow; before the first step initial values that depend on it do, too. */
 double ${name}_get(const ${name}_state *s, int parameter);
 int ${name}_set(${name}_state *s, int parameter, double value);
 
-/* The k-th switch in the log, 0 <= k < logged: its time, element (over all contacts), edge. */
+/* The k-th switch in the log: its time, element (over all contacts, from 0), edge. Without
+ * 0 <= k < logged they are NAN, -1, -1. */
 void ${name}_switch(const ${name}_state *s, int64_t k, double *t, int64_t *element, int64_t *edge);
 
 const char *${name}_edge(int64_t edge);

@@ -63,7 +63,7 @@ $read        if (read != $count || !strchr("\r\n", *place)) {
             fprintf(stderr, "row %ld: it must have $count numbers\n", row);
             return 1;
         }
-        code = ${name}_advance_to(&s, ${pairs}t);
+        code = ${name}_advance_to(&s, ${pairs}t, ${name}_MAX_STEPS);
         if (code == ${name}_OK)
             write_row(&s);
         if (switches)
