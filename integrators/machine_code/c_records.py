@@ -197,7 +197,6 @@ def records_text(module: Module, block: CBlock | None = None, taken: Iterable[st
     Examples
     --------
     >>> from integrators.machine_code.front_end.translate import Translator
-    >>> from integrators.step_size import raise_floor
     >>> from integrators.step_size import Control
     >>> from integrators.machine_code.front_end.values import NumberValue
     >>> from integrators.step_size import error_norm
@@ -209,7 +208,7 @@ def records_text(module: Module, block: CBlock | None = None, taken: Iterable[st
     >>> _ = translator.entry("entry", error_norm, [e, numbers[0], y, y_new, numbers[1], atol])
     >>> text = records_text(translator.module, CBlock("engine", layout))
     >>> print(text[text.index("static double entry"):].strip())
-    static double entry(engine *block, double h, double rtol)
+    static double entry(const engine *block, double h, double rtol)
     {
         return error_norm(block->part_0, h, block->part_1, block->part_2, rtol, block->part_3);
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import io
 import re
 import shutil
@@ -223,16 +224,26 @@ STEP = 1e-3
 
 def plain_step(folder: Path, subject: Subject, compiler: str = "") -> Callable[..., float]:
     """Return the step of a friction that has begun, as a function of its inputs and dt."""
+    return functools.partial(plain_library(folder, subject, compiler), "step")
+
+
+def plain_library(folder: Path, subject: Subject, compiler: str = "") -> Callable[..., float]:
+    """Return the functions of a friction that has begun, by their names."""
     files = plain_c(subject)
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
     made, source = f"{subject.name}.so", f"{subject.name}_plain.c"
     library = compiled(folder, compiler, made, "-shared", "-fPIC", source)
     loaded = ctypes.CDLL(str(library))
-    step, memory = loaded[f"{subject.name}_plain_step"], ctypes.create_string_buffer(65536)
-    step.restype = ctypes.c_double
+    memory = ctypes.create_string_buffer(65536)
     loaded[f"{subject.name}_plain_start"](memory)
-    return lambda *inputs: float(step(memory, *map(ctypes.c_double, inputs)))
+
+    def called(name: str, *inputs: float) -> float:
+        function = loaded[f"{subject.name}_plain_{name}"]
+        function.restype = ctypes.c_double
+        return float(function(memory, *map(ctypes.c_double, inputs)))
+
+    return called
 
 
 def plain_compared(name: str, seed: int, compiler: str, folder: Path) -> tuple[int, int]:

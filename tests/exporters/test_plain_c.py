@@ -29,8 +29,15 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import plain_c
 from tests.corpus import JUMPING, LIGHT
-from tests.exporters.c_programs import COMPILERS, needs_c, plain_compared, plain_step
+from tests.exporters.c_programs import (
+    COMPILERS,
+    needs_c,
+    plain_compared,
+    plain_library,
+    plain_step,
+)
 from tests.exporters.frictions import case, loaded
+from tests.exporters.plain_samples import sampled
 
 
 @needs_c
@@ -38,6 +45,29 @@ from tests.exporters.frictions import case, loaded
 def test_the_bits_of_the_engine(tmp_path: Path) -> None:
     switches, _ = plain_compared("gms-4-signed", 1, COMPILERS[0], tmp_path)
     assert switches
+
+
+@needs_c
+@pytest.mark.slow
+def test_a_sample_finds_every_arrest(tmp_path: Path) -> None:
+    counts = sampled("GMS 4", 30_000, tmp_path, COMPILERS[0])
+    assert counts.found == counts.arrests > 50
+    assert counts.error < 0.01
+
+
+@needs_c
+@pytest.mark.slow
+def test_a_sample_is_steps_up_to_the_change_of_direction_and_from_there(tmp_path: Path) -> None:
+    model = case("gms-4-signed", 1).model
+    one, other = (plain_library(tmp_path, Subject.of(model, "c99", name=name)) for name in "ab")
+    random = np.random.default_rng(2)
+    for v0, v1 in random.normal(size=(200, 2)).tolist():
+        before = 0.1 * (v0 / (v0 - v1)) if v0 * v1 < 0.0 else 0.0
+        if before:
+            other("step", 0.5 * v0, before)
+            other("step", 0.0, 0.0)
+        other("step", 0.5 * ((0.0 if before else v0) + v1), 0.1 - before)
+        assert one("sample", v0, v1, 0.1) == other("step", v1, 0.0)
 
 
 @needs_c

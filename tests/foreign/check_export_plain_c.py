@@ -10,6 +10,24 @@ import pytest
 
 from tests.exporters.c_programs import plain_compared
 from tests.exporters.frictions import NAMES
+from tests.exporters.plain_samples import CASES, sampled
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_random_samples_inside_the_limits(
+    name: str, ran: Callable[..., None], tmp_path: Path
+) -> None:
+    counts = sampled(name, 1_000_000, tmp_path, "gcc")
+    assert counts.found == counts.arrests
+    assert counts.arrests > 1000 or name == "LuGre"  # which has no states
+    told = subprocess.run(["gcc", "-dumpversion"], capture_output=True, text=True, check=True)
+    ran(
+        "c99",
+        f"gcc {told.stdout.strip()}",
+        f"plain form of {name}, 1,000,000 random samples inside its limits",
+        f"all {counts.arrests:,} arrests found; F at most {100 * counts.error:.1f} % of its "
+        f"largest value apart, {100 * counts.largest:.1f} % where a switch is a sample late",
+    )
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])

@@ -13,9 +13,11 @@ from gms_fsm.exporters.plain.form import plain_form
 from gms_fsm.exporters.plain.parts import Constant
 from gms_fsm.exporters.plain.walker import Forms, Walker, indented
 from gms_fsm.language import ARGUMENTS, C99, FUNCTIONS, NAMESPACE
-from integrators.machine_code.c99 import c99_text
+from integrators.machine_code.c_records import records_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
+from integrators.machine_code.possible import BlockStart
+from integrators.machine_code.simplified import simplified
 from integrators.machine_code.tree import Local
 
 __all__ = ["C_WORDS", "plain_c", "plain_c_notes"]
@@ -83,21 +85,40 @@ def plain_c_notes(subject: Subject) -> str:
 
     {name}_plain friction;
     {name}_plain_start(&friction);
-    F = {name}_plain_step(&friction, v, dt);    /* once a step */
+    F = {name}_plain_sample(&friction, v0, v1, dt);    /* once a sample */
 
-Each call looks at every guard once, returns the force, and then takes one explicit Euler step of
-length dt with this velocity. There is no heap and no global variable; exp, sin and the like are in
-the file itself and have the same bits on every platform. Compile it with any C99 compiler, such as
+During a sample the velocity goes from v0 to v1 on a straight line; the force is that at its end. A
+call takes at most four steps, so its time is bounded. Where the velocity changes its sign a step
+ends, and the guards are looked at there: an arrest is found although no sample has that velocity.
+The limits are in the header.
+
+A step, {name}_plain_step(&friction, v, dt), can also be called by itself: it looks at every guard
+once, returns the force, and then takes one explicit Euler step of length dt with this velocity.
+There is no heap and no global variable; exp, sin and the like are in the file itself and have the
+same bits on every platform. Compile it with any C99 compiler, such as
 
     gcc -std=c99 -O2 -ffp-contract=off -c {name}_plain.c
 
-With these options the numbers are those of
+With these options the numbers of single steps are those of
 simulate(model, Prescribed(record), t_end, method="euler", step=dt, events="step"), to the last bit.
 All of them are double.
 
-What it does not do: switches are seen at the next step, not where they happen, so the result is of
-first order in dt; a velocity that passes through a narrow guard between two steps is not noticed.
+What it does not do: other switches are seen at the next step, not where they happen, so the result
+is of first order in dt. A single step does not notice that the velocity has passed through a guard.
 """
+
+
+def limits_of(element: NamedFriction) -> list[str]:
+    """Return within which limits a sample finds every arrest, in sentences."""
+    found = [
+        "the velocity is linear in the sample, other inputs are constant",
+        "an element switches once in the sample at most, and once more after a change of direction",
+        "dt times the fastest rate at which a variable relaxes is at most 0.1",
+    ]
+    scale = next((c for c in element.constants if c.about.endswith("Stribeck velocity")), None)
+    if scale is not None and not isinstance(scale.value, tuple):
+        found.insert(1, f"|v1 - v0| is at most {scale.name} = {scale.value!r} m/s")
+    return found
 
 
 class PlainC:
@@ -114,6 +135,7 @@ class PlainC:
         element, self.me = self.element, self.element.free("friction")
         # One element needs no arrays and no loop.
         self.i = element.free("i") if element.n > 1 else ""
+        self.ends = element.free("v0"), element.free("v1")
         self.at = f"[{self.i}]" if self.i else ""
         texts = {c.name: f"{c.name}{self.at}" for c in element.constants if c.several}
         if element.position:
@@ -176,8 +198,14 @@ class PlainC:
             "",
             f"void {self.name}_start({self.name} *{self.me});",
             "",
-            f"/* One step: the force at its beginning [{self.element.force}]. */",
+            f"/* One step with a constant velocity: the force at its beginning [{self.element.force}]. */",
             f"{self.signature()};",
+            "",
+            "/* One sample, in which the velocity goes from v0 to v1 on a straight line: the force at",
+            f" * its end [{self.element.force}]. A change of direction is found; it takes four steps at most. Its limits:",
+            *(f" * - {FORMS.clean(each)};" for each in limits_of(element)[:-1]),
+            f" * - {FORMS.clean(limits_of(element)[-1])}. */",
+            f"{self.sample_signature()};",
             "",
             "#ifdef __cplusplus",
             "}",
@@ -191,6 +219,12 @@ class PlainC:
         arguments = ", ".join(f"double {name}" for name in (*inputs, self.form.dt))
         return f"double {self.name}_step({self.name} *{self.me}, {arguments})"
 
+    def sample_signature(self) -> str:
+        start, end = self.ends
+        others = [name for name, _ in self.element.inputs[1:]]
+        arguments = ", ".join(f"double {name}" for name in (start, end, *others, self.form.dt))
+        return f"double {self.name}_sample({self.name} *{self.me}, {arguments})"
+
     # ------------------------------------------------------------------ the code
     def code(self) -> str:
         body = self.step()
@@ -203,14 +237,15 @@ class PlainC:
             lines.append(f"/* {FORMS.clean(self.element.reference)} */")
         used = [name for name in ARGUMENTS if f"{self.name}_{name}(" in text]
         if used:
-            lines.append(self.elementary(used))
+            lines.append(self.elementary(used).rstrip())
+            lines.append("")
         elif "fabs(" in text or "sqrt(" in text:
             lines += ["#include <math.h>", ""]
         lines += [f'#include "{self.name}.h"']
         for name, helper in HELPERS.items():
             if f"{self.name}_{name}(" in text:
                 lines += ["", f"static double {self.name}_{name}{helper}"]
-        return "\n".join([*lines, "", *start, "", *body]) + "\n"
+        return "\n".join([*lines, "", *start, "", *body, "", *self.sample()]) + "\n"
 
     def elementary(self, names: Iterable[str]) -> str:
         """Return the functions that are the same on every platform."""
@@ -218,7 +253,8 @@ class PlainC:
         for name in names:
             numbers = [NumberValue(Local("f", each)) for each in "xy"[: ARGUMENTS[name]]]
             translator.entry(f"{self.name}_{name}", NAMESPACE[name], numbers)
-        return c99_text(translator.module, [self.name, *self.element.names], hidden=True)
+        module = simplified(translator.module, BlockStart({}, {}), (), ())
+        return records_text(module, taken=[self.name, *self.element.names])
 
     def start(self) -> list[str]:
         element, number, lines = self.element, C99.number, list[str]()
@@ -246,6 +282,29 @@ class PlainC:
             if not re.search(rf"(?<!\w){name}(?!\w)", text)
         ]
         return [self.signature(), "{", *indented([*unused, *body]), "}"]
+
+    def sample(self) -> list[str]:
+        (v0, v1), dt, before = self.ends, self.form.dt, self.element.free("before")
+        reads = [name for name, _ in self.element.inputs[1:]]
+
+        def step(v: str, passed: str, length: str) -> str:
+            given = "".join(
+                f", {name} + {passed}" if name == "t" and passed else f", {name}" for name in reads
+            )
+            return f"{self.name}_step({self.me}, {v}{given}, {length});"
+
+        lines = [
+            f"double {before} = 0.0;  /* until the velocity changes its sign */",
+            f"if (({v0} < 0.0 && {v1} > 0.0) || ({v0} > 0.0 && {v1} < 0.0)) {{",
+            f"    {before} = {dt} * ({v0} / ({v0} - {v1}));",
+            f"    {step(f'0.5 * {v0}', '', before)}",
+            f"    {step('0.0', before, '0.0')}",
+            f"    {v0} = 0.0;",
+            "}",
+            step(f"0.5 * ({v0} + {v1})", before, f"{dt} - {before}"),
+            f"return {step(v1, dt, '0.0')}",
+        ]
+        return [self.sample_signature(), "{", *indented(lines), "}"]
 
     def constant(self, constant: Constant) -> str:
         number, value = C99.number, constant.value

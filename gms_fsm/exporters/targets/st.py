@@ -10,6 +10,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._readme import about_friction
 from gms_fsm.exporters._subject import Subject
+from gms_fsm.exporters.plain.c import limits_of
 from gms_fsm.exporters.plain.element import NamedFriction
 from gms_fsm.exporters.plain.form import PlainForm, declared, plain_form
 from gms_fsm.exporters.plain.parts import Constant
@@ -125,7 +126,7 @@ class StructuredText:
         name = subject.name
         identifier(name.upper(), WORDS, f"name {name!r}")
         self.name, element = name, NamedFriction.of(subject, WORDS, cases=False)
-        own = [f"{name}_{each}" for each in DEFINED]
+        own = [f"{name}_{each}" for each in (*DEFINED, "sample")]
         for each in (name, *own):
             element.check_name(each, cases=False)
         element = element.reserved(name, *own)
@@ -189,6 +190,8 @@ class StructuredText:
             *_block("VAR", self.locals()),
             *body,
             "END_FUNCTION_BLOCK",
+            "",
+            *self.sample(),
         ]
         text = "\n".join(lines) + "\n"
         for each, defined in DEFINED.items():  # later ones call earlier ones
@@ -196,6 +199,48 @@ class StructuredText:
                 own = f"{name}_{each}"
                 text = FUNCTION.format(name=own, body=defined.format(own, name)) + text
         return text
+
+    def sample(self) -> Iterator[str]:
+        """Return the block of a sample in which the velocity goes on a straight line."""
+        element, cycle = self.element, self.form.dt
+        v0, v1, step, before, begin = map(element.free, ("v0", "v1", "step", "before", "begin"))
+        (v, _), *others = element.inputs
+        velocities = [(v0, "m/s: velocity at the last call"), (v1, "m/s: velocity now")]
+        inputs = [*velocities, *others, (cycle, "s: since the last call")]
+
+        def call(velocity: str, passed: str, length: str) -> str:
+            given = "".join(
+                f", {each} := {each} + {passed}"
+                if each == "t" and passed
+                else f", {each} := {each}"
+                for each, _ in others
+            )
+            return f"{step}({v} := {velocity}{given}, {cycle} := {length});"
+
+        yield "(* One sample, in which the velocity goes from v0 to v1 on a straight line: the force"
+        yield "   at its end. A change of direction is found; it takes four steps at most. Limits:"
+        *first, last = map(FORMS.clean, limits_of(element))
+        yield from (f"   - {each};" for each in first)
+        yield f"   - {last}. *)"
+        yield f"FUNCTION_BLOCK {self.name}_sample"
+        yield from _block(
+            "VAR_INPUT", (f"{each} : LREAL;{FORMS.note(about)}" for each, about in inputs)
+        )
+        yield from _block("VAR_OUTPUT", [f"{self.force} : LREAL;  (* N: friction force *)"])
+        locals_ = [f"{step} : {self.name};", f"{before} : LREAL;", f"{begin} : LREAL;"]
+        yield from _block("VAR", locals_)
+        yield f"{before} := 0.0;"
+        yield f"{begin} := {v0};"
+        yield f"IF ({v0} < 0.0 AND {v1} > 0.0) OR ({v0} > 0.0 AND {v1} < 0.0) THEN"
+        yield f"    {before} := {cycle} * ({v0} / ({v0} - {v1}));"
+        yield f"    {call(f'0.5 * {v0}', '', before)}"
+        yield f"    {call('0.0', before, '0.0')}"
+        yield f"    {begin} := 0.0;"
+        yield "END_IF;"
+        yield call(f"0.5 * ({begin} + {v1})", before, f"{cycle} - {before}")
+        yield call(v1, cycle, "0.0")
+        yield f"{self.force} := {step}.{self.force};"
+        yield "END_FUNCTION_BLOCK"
 
     def constants(self) -> Iterator[str]:
         yield from map(self.constant, self.element.constants)
@@ -246,16 +291,17 @@ class StructuredText:
         return f"""\
 # {visible(element.title)} as structured text (IEC 61131-3)
 
-- {name}.st: the function block {name}{functions}
+- {name}.st: the function blocks {name} and {name}_sample{functions}
 
 ## How to run it
 
 Import {name}.st into the project of a PLC, declare an instance, and call it once in every cycle of
 a task with a fixed interval:
 
-    VAR friction : {name}; END_VAR
-    friction(v := velocity{inputs}, {self.form.dt} := 0.001);
+    VAR friction : {name}_sample; END_VAR
+    friction(v0 := before, v1 := velocity{inputs}, {self.form.dt} := 0.001);
     force := friction.{self.force};
+    before := velocity;
 
 The compiler matiec 0.1 (`iec2c`) has translated it, and the result has run; blark has parsed it.
 No PLC has run it.
@@ -263,14 +309,17 @@ No PLC has run it.
 ## What it computes
 
 {about_friction(element)}
-Each call looks at every guard once, gives the force, and takes one explicit Euler step of length
-{self.form.dt} [s] with this velocity. These are the numbers of
+During a call of {name}_sample the velocity goes from v0 to v1 on a straight line; the force is that
+at its end. It takes at most four steps, so its time is bounded; where the velocity changes its sign
+a step ends, and the guards are looked at there. A step, the function block {name}, looks at every
+guard once, gives the force, and takes one explicit Euler step of length {self.form.dt} [s] with its
+velocity. The steps have the numbers of
 simulate(model, Prescribed(record), t_end, method="euler", step=..., events="step").
 
 ## What it does not do
 
-Switches are seen at the next call, not where they happen, so the result is of first order in the
-cycle time. A velocity that passes through a narrow guard between two calls is not noticed.
+Other switches are seen at the next step, not where they happen, so the result is of first order in
+the cycle time. {name} by itself does not notice that the velocity has passed through a guard.
 AND and OR may evaluate both sides.
 """
 
