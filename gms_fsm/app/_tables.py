@@ -55,21 +55,25 @@ class TextTable(Table):
         "", description='condition for the rows to use, for example "normal > 4.5 N"'
     )
     missing: Literal["error", "drop", "interpolate"] = Field(
-        "error", description="what to do where a cell is empty or NaN"
+        "error", description="what to do where a cell is empty, NaN or a word such as OVR"
     )
+    sort: bool = Field(False, description="whether to sort the rows by time")
+    duplicates: Literal["error", "mean"] = Field("error", description="rows of the same time")
     delimiter: Literal["\t", ";", ",", "|", " "] | None = None
     decimal: Literal[".", ","] = "."
+    thousands: Literal[",", ".", " ", "'"] | None = None
     comment: list[str] = Field(["#", "%"], description="what comment lines begin with")
     header: int | None = Field(
         None, ge=1, description="row of the column names; by default the first that has them"
     )
+    columns: list[str] | None = Field(None, description="names of a table that has none")
     encoding: str | None = Field(None, description='for example "cp1252"; by default UTF-8')
 
-    def read(self, path: Path, columns: Mapping[str, Column]) -> Record:
+    def read(self, path: Path, columns: Mapping[str, Any]) -> Record:
         """Return the record with these columns and the time."""
         given: dict[str, Any] = dict.fromkeys(("position", "velocity", "force", "normal"))
-        options = ("where", "missing", "delimiter", "decimal", "comment", "header", "encoding")
-        given |= {name: getattr(self, name) for name in options}
+        own = {"file", "time", *given, "smoothing", "inputs", "value"}
+        given |= {name: value for name, value in self if name not in own}
         given |= columns
         return Record.from_csv(path, time=self.time.build(), **given)
 
@@ -81,13 +85,15 @@ class RecordTable(TextTable):
     velocity: ColumnTable | None = None
     force: ColumnTable | None = Field(None, description="measured friction, for comparison")
     normal: ColumnTable | None = Field(None, description="normal force")
+    inputs: dict[str, ColumnTable] = Field({}, description="columns for inputs of the chart")
     smoothing: float | None = Field(None, ge=0, description="time constant of the spline, s")
 
-    def columns(self) -> dict[str, Column]:
+    def quantities(self) -> dict[str, Any]:
         """Return the given columns."""
         names = ("position", "velocity", "force", "normal")
         tables = {name: getattr(self, name) for name in names}
-        return {name: table.build() for name, table in tables.items() if table is not None}
+        found = {name: table.build() for name, table in tables.items() if table is not None}
+        return found | {"inputs": {name: each.build() for name, each in self.inputs.items()}}
 
 
 class SignalRecordTable(TextTable):
@@ -281,6 +287,7 @@ class FitTable(Table):
     begin: Literal["relaxed", "run in"] | None = Field(
         None, description="state in which a record begins; by default whichever fits better"
     )
+    weight: Literal["rows", "records"] | None = Field(None, description="what counts alike")
 
     @model_validator(mode="after")
     def _fits(self) -> FitTable:

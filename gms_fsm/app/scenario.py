@@ -421,7 +421,11 @@ def _loaded(file: TomlFile, scenario: Scenario) -> Loaded:
             record = read_record(file, scenario.record)
             with blaming(file, "record"):
                 motion = record.motion(scenario.record.smoothing)
-            rig = Prescribed(Corners(motion.time, motion.velocity, held=False))
+            inputs = {
+                name: Corners(motion.time, value, held=False)
+                for name, value in record.inputs.items()
+            }
+            rig = Prescribed(Corners(motion.time, motion.velocity, held=False), inputs)
             start = float(motion.time[0]) if start is None else start
             end = float(motion.time[-1]) if end is None else end
             initial.setdefault("x", float(np.interp(start, motion.time, motion.position)))
@@ -460,7 +464,7 @@ def _signal(file: TomlFile, given: SignalField, quantity: str) -> SignalLike:
 def read_record(file: TomlFile, table: RecordTable) -> Record:
     """Read the record of a scenario."""
     with blaming(file, "record"):
-        return table.read(find_file(file.path, table.file), table.columns())
+        return table.read(find_file(file.path, table.file), table.quantities())
 
 
 def find_file(scenario: Path, name: str) -> Path:

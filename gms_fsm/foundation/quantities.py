@@ -22,7 +22,7 @@ LONGEST_NUMBER = 60  # characters, with its unit: the search takes quadratic tim
 # Factors to SI.
 NOT_OF_SI = {
     **{"g": 1e-3, "min": 60.0, "h": 3600.0, "%": 0.01, "in": 0.0254, "lbf": 4.4482216152605},
-    **{"deg": math.pi / 180.0, "rpm": math.pi / 30.0},
+    **{"deg": math.pi / 180.0, "rpm": math.pi / 30.0, "bar": 1e5, "K": 1.0, "1": 1.0},
 }
 # What a unit of a translation is for a rotation, unit by unit.
 OF_ROTATION = {"m": "rad", "N": "Nm", "Ns": "Nms", "kg": "kg m^2"}
@@ -195,6 +195,17 @@ UNITS = {
         "torque": "Nm kNm mNm uNm",
     }.items()
 }
+# A column of a record may be that of a rotation.
+_ROTATIONS = {
+    **{"position": "angle", "velocity": "angular velocity"},
+    **{"force": "torque", "normal": "torque"},
+}
+ROTARY = {unit for quantity in _ROTATIONS.values() for unit in UNITS[quantity]}
+COLUMN_UNITS = {
+    quantity: UNITS[quantity] | UNITS.get(_ROTATIONS.get(quantity, ""), {})
+    for quantity in ("time", *_ROTATIONS)
+}
+_SPELLED = {"µ": "u", "μ": "u", "°": "deg", "N·m": "Nm", "N m": "Nm", "N*m": "Nm", "1/min": "rpm"}
 
 
 def of_rotation(unit: str) -> str:
@@ -284,17 +295,40 @@ def plain(unit: str) -> str:
     Returns
     -------
     str
-        Without spaces around it, and with ``u`` for micro.
+        Without spaces around it, and with ``u`` for micro, ``deg`` for ``°``, ``rpm`` for ``1/min``.
 
     Examples
     --------
-    >>> plain(" µm")
-    'um'
+    >>> plain(" µm"), plain("°/s"), plain("mN·m")
+    ('um', 'deg/s', 'mNm')
     """
-    return unit.strip().replace("µ", "u").replace("μ", "u")
+    found = unit.strip()
+    for spelled, name in _SPELLED.items():
+        found = found.replace(spelled, name)
+    return found
 
 
-def factor(quantity: str, unit: str) -> float:
+def input_factor(unit: str) -> tuple[float, float]:
+    """Return factor and offset from any unit to SI, for what is not a motion or a force.
+
+    >>> input_factor("kN"), input_factor("bar"), input_factor("°C")
+    ((1000.0, 0.0), (100000.0, 0.0), (1.0, 273.15))
+    """
+    name = plain(unit)
+    if name == "degC":
+        return 1.0, 273.15
+    found = 1.0 if not name else _size(name)
+    if not math.isfinite(found):
+        raise UnitError(
+            f"unknown unit {shown(unit)}",
+            advice="use one of SI with a prefix, for example N, kN, Pa, bar, K, °C, A, Nm; or 1",
+        )
+    return found, 0.0
+
+
+def factor(
+    quantity: str, unit: str, table: Mapping[str, Mapping[str, float]] | None = None
+) -> float:
     """Return the factor from a unit to SI.
 
     Parameters
@@ -303,6 +337,8 @@ def factor(quantity: str, unit: str) -> float:
         The quantity.
     unit : str
         Unit, for example ``"mm"``; ``µ`` and ``μ`` are read as ``u``.
+    table : mapping, optional
+        The units of each quantity; by default `UNITS`.
 
     Returns
     -------
@@ -319,10 +355,11 @@ def factor(quantity: str, unit: str) -> float:
     >>> factor("position", "µm")
     1e-06
     """
-    name, known = plain(unit), UNITS[quantity]
+    table = UNITS if table is None else table
+    name, known = plain(unit), table[quantity]
     if name in known:
         return known[name]
-    for other, units in UNITS.items():
+    for other, units in table.items():
         if name in units:
             raise UnitError(
                 f"unit {shown(unit)} measures {other}, not {quantity}",
@@ -360,7 +397,8 @@ def convert_numbers(text: str, quantities: Mapping[str, str] | None = None) -> s
     >>> convert_numbers("abs(v) > 300 mm/s", {"v": "velocity"})
     'abs(v) > 0.3     '
     """
-    known = {each: each for each in UNITS} if quantities is None else quantities
+    table = COLUMN_UNITS if quantities is None else UNITS
+    known = {each: each for each in table} if quantities is None else quantities
     # Possessive (++): 2e3 is not 2 with the unit e3, and long digit strings do not backtrack.
     number = r"(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][-+]?\d++)?+"
     number_unit = rf"(?<![\w.])({number})\s*+([^\W\d]\w*+(?:/s)?)"
@@ -370,9 +408,11 @@ def convert_numbers(text: str, quantities: Mapping[str, str] | None = None) -> s
 
         def in_si(found: re.Match[str]) -> str:
             value, unit = float(found.group(1)), found.group(2)
-            fitting = measured or [q for q, units in UNITS.items() if plain(unit) in units]
+            fitting = measured or [q for q, units in table.items() if plain(unit) in units]
             # Padded to the length of the original if possible, so columns in messages are correct.
-            return repr(value * factor((fitting or ["force"])[0], unit)).ljust(len(found.group(0)))
+            return repr(value * factor((fitting or ["force"])[0], unit, table)).ljust(
+                len(found.group(0))
+            )
 
         return re.sub(number_unit, in_si, clause)
 

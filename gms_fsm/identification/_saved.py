@@ -40,7 +40,7 @@ def save(fit: Fit, path: Path) -> Path:
 
     A long motion is written to a table beside it, with the same name and the ending ``.csv``.
     """
-    course = fit.task.course(fit.records[0], None)
+    course = fit.task.along(fit.records[0], None)[0]
     start = fit.task.fine.driver.start(fit.task.subject, course)
     signals = {name: _signal(signal, name, path) for name, signal in start.system.signals.items()}
     return save_as(

@@ -18,6 +18,8 @@ from gms_fsm.charts.chart import Chart, State, Transition
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.charts.zoo.bristles.maxwell_slip import MAXWELL_SLIP
 from gms_fsm.identification.bank import initial_bank
+from gms_fsm.identification.play_bank import SPRING_WITH_PLAY
+from gms_fsm.identification.play_bank import play_bank as solved_bank
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import GMS, ChartModel, Model
 from gms_fsm.systems.system import System
@@ -31,6 +33,7 @@ __all__ = [
     "FitStart",
     "behind_backlash",
     "gms",
+    "play_bank",
     "stiffer_one_way",
 ]
 
@@ -286,6 +289,24 @@ def behind_backlash(records: Sequence[Record], smoothing: float | None, *, n: in
     )
 
 
+def play_bank(records: Sequence[Record], smoothing: float | None) -> FitStart:
+    """Return a bank of slipping springs with play, each flank of its own; nothing is searched.
+
+    Parameters
+    ----------
+    records, smoothing
+        As in `gms`.
+
+    Returns
+    -------
+    Start
+        The terms that least squares on a grid of thresholds and gaps needs.
+    """
+    bank = solved_bank(records, smoothing)
+    model = ChartModel(SPRING_WITH_PLAY, bank.values, n=len(bank.z_c), sigma_2=bank.sigma_2)
+    return FitStart(model, bank.used)
+
+
 # --------------------------------------------------------------------------- the list
 CANDIDATES: tuple[Candidate, ...] = (
     Candidate("GMS 1", "one spring that slips: the least that has hysteresis", partial(gms, n=1)),
@@ -316,5 +337,10 @@ CANDIDATES: tuple[Candidate, ...] = (
         "behind backlash 2",
         "the same with two flanks, or one flank and one spring without play",
         partial(behind_backlash, n=2),
+    ),
+    Candidate(
+        "play bank",
+        "many springs with gaps, each flank of its own, thresholds that fall with speed",
+        play_bank,
     ),
 )

@@ -245,7 +245,7 @@ def _training_rows(record: Record, options: FitOptions) -> Record:
         "position": motion.position[:last],
         "velocity": motion.velocity[:last],
         "force": record.columns["force"][:last],
-    }
+    } | {name: value[:last] for name, value in record.inputs.items()}
     return replace(record, columns=columns, chosen=chosen[:last], rows=record.rows[:last])
 
 
@@ -480,8 +480,9 @@ def _scored(
         raise refined.lost
     squares, count = 0.0, 0
     for record in left:
-        course = own.course(record, None)
-        error = (at_all_rows(own.coarse, refined, course) - course.measured)[course.rows]
+        modelled = at_all_rows(own.coarse, refined, own.along(record, None))
+        error = (modelled - record.columns["force"])[record.chosen]
+        error = error[np.isfinite(error)]
         squares, count = squares + float(error @ error), count + error.size
     return squares, float(count)
 

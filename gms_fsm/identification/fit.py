@@ -34,9 +34,16 @@ from gms_fsm.identification.certainty.assess import (
 )
 from gms_fsm.identification.problem.experiment import MASS, NUISANCE, Point, value_of
 from gms_fsm.identification.problem.linear import linear_names
-from gms_fsm.identification.problem.runs import BEGINS, ThreadPool
+from gms_fsm.identification.problem.runs import BEGINS, MOVING, ThreadPool
 from gms_fsm.identification.problem.search import SEARCHES, Best
-from gms_fsm.identification.problem.task import FitOptions, Task, bar, inside, training_rows
+from gms_fsm.identification.problem.task import (
+    WEIGHTS,
+    FitOptions,
+    Task,
+    bar,
+    inside,
+    training_rows,
+)
 from gms_fsm.identification.problem.unknowns import values_by_key
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.record import Record
@@ -51,6 +58,7 @@ STOPPED = "The search was interrupted: this is the best so far."
 STOPPED_LATE = "Interrupted before the intervals were known: this is the best so far."
 FEWEST_ROWS = 20
 AGAIN = 3  # searches from a better point met while looking for the ends of intervals
+LOAD_DIFFERS = 0.05  # relative
 STILL = 1e-9  # of its size: a column that varies less is constant
 
 
@@ -75,6 +83,7 @@ def fit(
     most_steps: int | None = None,
     smoothing: float | None = None,
     begin: Literal["relaxed", "run in"] | None = None,
+    weight: Literal["rows", "records"] | None = None,
     progress: bool | None = None,
 ) -> Fit:
     """Find parameters of a model, or of a system, from measured records.
@@ -125,7 +134,11 @@ def fit(
         Time constant of the motion's smoothing spline, s; see `Record.motion`.
     begin : {"relaxed", "run in"}, optional
         What is before the first row: all deflections zero, or a first pass of the record's own
-        motion. By default whichever fits the training rows better; see `Fit.begin`.
+        motion. By default whichever fits the training rows better; see `Fit.begin`. Where a record
+        is cut and nothing leads to its state (behind a gap in time), the state is found, too.
+    weight : {"rows", "records"}, optional
+        Whether each row counts alike, or each record; by default records if the longest has more
+        than three times the rows of the shortest.
     progress : bool, optional
         Show a progress bar on standard error; by default if that is a terminal.
 
@@ -171,6 +184,7 @@ def fit(
         most_steps=most_steps,
         smoothing=smoothing,
         begin=begin,
+        weight=weight,
     )
     task = task_of(records, model, {} if fixed is None else fixed, options)
     return fitted(task, progress=progress)
@@ -188,6 +202,8 @@ def options_of(**given: Any) -> FitOptions:
     one_of("search", given["search"], SEARCHES)
     if given["begin"] is not None:
         one_of("begin", given["begin"], BEGINS)
+    if given.get("weight") is not None:
+        one_of("weight", given["weight"], WEIGHTS)
     for name in given["nuisance"]:
         one_of("nuisance", name, tuple(NUISANCE))
         if given["nuisance"].count(name) > 1:
@@ -272,8 +288,9 @@ def task_of(
         As in `fit`.
     """
     every = checked_records(records)
-    subject = _with_fixed(mounted_alone(model), fixed, options.free)
-    task = Task(subject, tuple(every), options, begin=options.begin or BEGINS[1])
+    names = {name: None for record in every for name in record.inputs}
+    subject = _with_fixed(mounted_alone(model, inputs=names), fixed, options.free)
+    task = Task(subject, tuple(every), options, begin=options.begin or MOVING)
     _ = task.unknowns  # raises errors of names and bounds
     if MASS in options.nuisance and task.measured.column != "force":
         raise ParameterError(
@@ -312,6 +329,7 @@ def _check_records(task: Task) -> None:
                 advice=f"give {column} = {{ column = ..., unit = ... }} in a scenario, "
                 f"{column}=(name, unit) in Python; it has {', '.join(record.columns)}",
             )
+    _check_loads(task)
     train, test = task.options.train, task.options.test
     if train is not None and test is not None and train[0] < test[1] and test[0] < train[1]:
         raise ParameterError(
@@ -356,6 +374,21 @@ def _check_records(task: Task) -> None:
             f"the {column} is constant ({values[0]:.6g}) in the rows to train on",
             place=task.records[0].place,
             advice=f"check the {column} column and its unit",
+        )
+
+
+def _check_loads(task: Task) -> None:
+    """Refuse records with loads that differ, if the model reads a load and is not given theirs."""
+    mean = [float(each.columns["normal"].mean()) for each in task.records if "normal" in each.columns]
+    if "N" in task.bound or "N" not in task.subject.bindable or len(mean) < 2:
+        return
+    if np.ptp(mean) > LOAD_DIFFERS * np.abs(mean).max():
+        raise RecordError(
+            f"its normal force is {mean[0]:.4g} N, that of others up to "
+            f"{max(mean, key=lambda each: abs(each - mean[0])):.4g} N, and the model reads one N "
+            "for all",
+            place=task.records[0].place,
+            advice="give each record's own: inputs={'N': ...} when making it",
         )
 
 
@@ -499,6 +532,11 @@ def _notes(task: Task, silent: Sequence[str]) -> tuple[str, ...]:
         )
     else:
         notes.append("each record begins with the initial state of the chart")
+    if task.fine.weights:
+        notes.append("each record counts alike, however long it is (weight)")
+    unread = {name for record in task.records for name in record.inputs} - {*task.bound}
+    if unread:
+        notes.append(f"inputs that the model does not read: {', '.join(sorted(unread))}")
     if silent:
         notes.append(f"without influence on the force of these records: {', '.join(silent)}")
     return tuple(notes)

@@ -31,7 +31,7 @@ from gms_fsm.identification.certainty.intervals import Bootstrap, bootstrapped, 
 from gms_fsm.identification.certainty.profile import Profile
 from gms_fsm.identification.certainty.statistics import phase_floor
 from gms_fsm.identification.problem.experiment import Point
-from gms_fsm.identification.problem.runs import Course
+from gms_fsm.identification.problem.runs import BEGINS, MOVING, Course
 from gms_fsm.identification.problem.task import Task, at_all_rows, inside, training_rows
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
@@ -211,7 +211,7 @@ class Fit:
     @property
     def begin(self) -> str:
         """What is before the first row of a record: ``"relaxed"`` or ``"run in"``."""
-        return self.task.begin
+        return BEGINS[1] if self.task.begin == MOVING else self.task.begin
 
     @property
     def measured(self) -> str:
@@ -227,8 +227,9 @@ class Fit:
     @cached_property
     def training(self) -> dict[str, float]:
         """Score on the training rows: ``rmse``, ``r2``, ``rows``."""
-        target = self.task.fine.target
-        return score_of(target, target + self.point.residual)
+        fine = self.task.fine
+        target = fine.unweighted(fine.target)
+        return score_of(target, target + fine.unweighted(self.point.residual))
 
     @cached_property
     def held_out(self) -> dict[str, float] | None:
@@ -298,16 +299,14 @@ class Fit:
     def _residuals(self) -> tuple[Residuals, ...]:
         found = []
         for record in self.records:
-            course = self.task.course(record, None)
-            train = training_rows(record, self.task.options) & course.rows
-            held = inside(course.t, self.test) if self.test else np.zeros(len(record), bool)
-            held = held & course.rows
-            modelled = at_all_rows(self.task.fine, self.point, course)
-            found.append(
-                Residuals(
-                    record, course.t, course.x, course.v, course.measured, modelled, train, held
-                )
-            )
+            along = self.task.along(record, None)
+            modelled = at_all_rows(self.task.fine, self.point, along)
+            motion, rows = record.motion(self.smoothing), record.chosen & np.isfinite(modelled)
+            t, x, v = motion.time, motion.position, motion.velocity
+            train = training_rows(record, self.task.options) & rows
+            held = (inside(t, self.test) if self.test else np.zeros(len(record), bool)) & rows
+            measured = record.columns[self.task.measured.column]
+            found.append(Residuals(record, t, x, v, measured, modelled, train, held))
         return tuple(found)
 
     def predict(self, record: Record) -> FloatArray:
@@ -331,7 +330,7 @@ class Fit:
             If the run fails.
         """
         checked_kind("record", record, Record, "a Record, from Record.from_csv or from_dataframe")
-        return at_all_rows(self.task.fine, self.point, self.task.course(record, None))
+        return at_all_rows(self.task.fine, self.point, self.task.along(record, None))
 
     def score(self, record: Record) -> dict[str, float]:
         """Return how well the fitted model predicts a record.

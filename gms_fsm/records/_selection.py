@@ -15,17 +15,24 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ExpressionError, ParameterError, RecordError, UnitError, keyed, shown
-from gms_fsm.foundation.arguments import one_of
+from gms_fsm.foundation.arguments import checked_kind, one_of
 from gms_fsm.foundation.quantities import convert_numbers
 from gms_fsm.language import evaluate, names_in, parse_condition
 from gms_fsm.records._columns import LOADS, QUANTITIES
 from gms_fsm.records._table import Words
+from gms_fsm.records.motion import GAP
 
 FEWEST = 5  # rows of a record
-GAP = 5.0  # time steps longer than this many median steps are reported
 MISSING = ("error", "drop", "interpolate")
+DUPLICATES = ("error", "mean")
+# What instruments write where they have no number, in lower case.
+GAP_WORDS = frozenset(
+    "nan na n/a #n/a null none nil - -- --- ? ovr ovl ovld ol over overflow overrange "
+    "out-of-range invalid error err missing".split()
+)
 Rows: TypeAlias = NDArray[np.int64]
 Chosen: TypeAlias = NDArray[np.bool_]
+THOUSANDS = re.compile(r"\s*[-+]?\d{1,3}([ .,'’\u00a0\u202f]\d{3})+([.,]\d*)?\s*")
 DECIMAL = re.compile(r"\s*[-+]?\d*([.,])\d+([eE][-+]?\d+)?\s*")
 
 
@@ -108,11 +115,21 @@ def selected(
     words: Words,
     where: Any = "",
     missing: Any = "error",
+    *,
+    sort: Any = False,
+    duplicates: Any = "error",
 ) -> RecordRows:
     """Select rows, treat gaps as asked, and check the result."""
     if not isinstance(where, str):
         raise ParameterError("it must be a condition, as a text", place="where", value=where)
     one_of("missing", missing, MISSING)
+    one_of("duplicates", duplicates, DUPLICATES)
+    checked_kind("sort", sort, bool, "True or False")
+    notes: list[str] = []
+    if sort:
+        values, rows = _sorted(values, rows, notes)
+    if duplicates == "mean":
+        values, rows = _averaged(values, rows, notes)
     with keyed("where"):
         chosen = _chosen(origin, values, where, rows.size)
     if not chosen.any():
@@ -122,7 +139,7 @@ def selected(
             raise origin.error(
                 f"no row satisfies where = {shown(where)}", "choose another condition"
             )
-    part = _from_first_to_last(origin, RecordRows(values, chosen, rows, []), words, where)
+    part = _from_first_to_last(origin, RecordRows(values, chosen, rows, notes), words, where)
     part = _without_gaps(origin, part, words, missing)
     _check_finite(origin, part, tuple(values))
     _check_size(origin, part)
@@ -132,11 +149,41 @@ def selected(
     return part
 
 
+def _sorted(
+    values: dict[str, FloatArray], rows: Rows, notes: list[str]
+) -> tuple[dict[str, FloatArray], Rows]:
+    """Return the rows in the order of their times, those without one last."""
+    order = np.argsort(values["time"], kind="stable")
+    moved = int((order != np.arange(rows.size)).sum())
+    if moved:
+        notes.append(f"{moved} row(s) were sorted by time")
+    return {name: value[order] for name, value in values.items()}, rows[order]
+
+
+def _averaged(
+    values: dict[str, FloatArray], rows: Rows, notes: list[str]
+) -> tuple[dict[str, FloatArray], Rows]:
+    """Return one row for each run of equal times, with the means of what they have."""
+    time = values["time"]
+    first = np.flatnonzero(np.append(True, np.diff(time) != 0.0))
+    if first.size == rows.size:
+        return values, rows
+    notes.append(f"{rows.size - first.size} row(s) have the time of the one before: means are used")
+    found = {}
+    for name, value in values.items():
+        known = np.isfinite(value)
+        sums = np.add.reduceat(np.where(known, value, 0.0), first)
+        counts = np.add.reduceat(known.astype(float), first)
+        found[name] = np.where(counts > 0.0, sums / np.maximum(counts, 1.0), value[first])
+    return found | {"time": time[first].copy()}, rows[first]
+
+
 def _chosen(origin: Origin, values: Mapping[str, FloatArray], where: str, rows: int) -> Chosen:
     if not where.strip():
         return np.ones(rows, dtype=bool)
     try:
-        condition = parse_condition(convert_numbers(where), QUANTITIES)
+        own = [name for name in values if name not in QUANTITIES]
+        condition = parse_condition(convert_numbers(where), (*QUANTITIES, *own))
     except ExpressionError as error:
         in_place = ExpressionError(error.reason, where, error.column, error.allowed)
         raise RecordError(
@@ -192,7 +239,11 @@ def _from_first_to_last(origin: Origin, part: RecordRows, words: Words, where: s
 
 # --------------------------------------------------------------------------- gaps
 def _without_gaps(origin: Origin, part: RecordRows, words: Words, missing: str) -> RecordRows:
-    """Return the rows without empty cells and NaN, as asked."""
+    """Return the rows without empty cells and NaN, as asked.
+
+    Where a force is missing the motion goes on, and nothing is compared; nor is it where the motion
+    was filled in.
+    """
     _check_words(origin, part, words, missing)
     gaps = {name: np.isnan(value) & part.needed(name) for name, value in part.columns.items()}
     gaps = {name: gap for name, gap in gaps.items() if gap.any()}
@@ -200,22 +251,35 @@ def _without_gaps(origin: Origin, part: RecordRows, words: Words, missing: str) 
         _check_finite(origin, part, ("time",))
         _check_order(origin, part)
         return part
-    lost = np.logical_or.reduce(list(gaps.values()))
-    numbers = part.rows[lost]
-    if missing == "drop":
+    none = np.zeros(part.rows.size, dtype=bool)
+    moving = [gap for name, gap in gaps.items() if name not in LOADS]
+    lost = np.logical_or.reduce([none, *moving])
+    unmeasured = np.logical_or.reduce([none, *(g for n, g in gaps.items() if n in LOADS)]) & ~lost
+    if unmeasured.any():
+        part.notes.append(
+            f"{int(unmeasured.sum())} row(s) without a force are not compared, "
+            f"{origin.rows(part.rows[unmeasured])}"
+        )
+    part = RecordRows(part.columns, part.chosen & ~unmeasured, part.rows, part.notes)
+    if missing == "drop" and lost.any():
+        numbers = part.rows[lost]
         part = part.only(~lost)
         part.notes.append(
             f"{numbers.size} row(s) with an empty cell or NaN are left out, {origin.rows(numbers)}"
         )
+    if not part.chosen.any():
+        raise origin.error("no row is complete", "give a record with some complete rows")
     _check_finite(origin, part, ("time",))
     _check_order(origin, part)
-    if missing == "interpolate":
+    if missing == "interpolate" and lost.any():
         for quantity, gap in gaps.items():
-            _fill(origin, part, quantity, gap)
+            if quantity not in LOADS:
+                _fill(origin, part, quantity, gap)
         part.notes.append(
-            f"{sum(int(gap.sum()) for gap in gaps.values())} empty cell(s) or NaN are interpolated "
-            f"in time, {origin.rows(numbers)}"
+            f"{sum(map(int, (gap.sum() for gap in moving)))} empty cell(s) or NaN of the motion "
+            f"are interpolated in time and not compared, {origin.rows(part.rows[lost])}"
         )
+        part = RecordRows(part.columns, part.chosen & ~lost, part.rows, part.notes)
     return part
 
 
@@ -241,7 +305,7 @@ def _check_words(origin: Origin, part: RecordRows, words: Words, missing: str) -
     needed = {name: set(part.rows[part.needed(name)].tolist()) for name in part.columns}
     wrong = {place: text for place, text in words.items() if place[0] in needed[place[1]]}
     if missing != "error":
-        wrong = {place: text for place, text in wrong.items() if text.strip()}
+        wrong = {place: text for place, text in wrong.items() if not is_gap(text)}
     if not wrong:
         return
     _check_separator(origin, wrong)
@@ -250,8 +314,10 @@ def _check_words(origin: Origin, part: RecordRows, words: Words, missing: str) -
     advice = "correct it, or exclude the row with where = ..., a condition that is false there"
     if quantity == "time" and ":" in text:
         advice = "give times in s, for example since the first row"
-    if not text.strip():
+    if is_gap(text):
         advice += ', or give missing = "drop" or "interpolate"'
+    elif THOUSANDS.fullmatch(text):
+        advice = "if it is written with a separator of thousands, give it: thousands = ..."
     if origin.kind == "frame" and row == 0:
         advice += (
             "; if it is a line of units, leave it out (pandas.read_csv(..., skiprows=[1])), or let "
@@ -260,6 +326,11 @@ def _check_words(origin: Origin, part: RecordRows, words: Words, missing: str) -
     raise origin.error(
         f"{origin.cells(quantity, np.array([row]))}: {shown(text)} is not a number", advice
     )
+
+
+def is_gap(text: str) -> bool:
+    """Return whether a cell says that there is no number."""
+    return not text.strip() or text.strip().strip("[]()<>*").lower() in GAP_WORDS
 
 
 def _check_separator(origin: Origin, words: Words) -> None:
@@ -272,6 +343,8 @@ def _check_separator(origin: Origin, words: Words) -> None:
             what, advice = 'a decimal point, but decimal = ","', "leave that option out"
         if origin.kind == "frame":
             advice = 'read the table with decimal = ","'
+        if THOUSANDS.fullmatch(words[row, quantity]):
+            advice += "; if it separates thousands, thousands = " + shown(found.group(1))
         raise origin.error(
             f"{origin.cells(quantity, np.array([row]))}: {shown(words[row, quantity])} has {what}",
             advice,
@@ -303,7 +376,7 @@ def _check_order(origin: Origin, part: RecordRows) -> None:
             f"time does not increase after {origin.rows(part.rows[back])} "
             f"({origin.rows(part.rows[[i]])}: {float(time[i])!r} s, next: "
             f"{float(time[i + 1])!r} s)",
-            "sort the rows and remove duplicates",
+            'sort the rows and remove duplicates, or give sort = true, duplicates = "mean"',
         )
 
 
@@ -324,6 +397,6 @@ def gaps_in(origin: Origin, time: FloatArray, numbers: Rows) -> list[str]:
         return []
     return [
         f"{gaps.size} gap(s) in time, longer than {GAP:g} median intervals of {usual:.6g} s, after "
-        f"{origin.rows(numbers[gaps])} (the longest {steps.max():.6g} s): the motion is "
-        "interpolated"
+        f"{origin.rows(numbers[gaps])} (the longest {steps.max():.6g} s): a fit begins anew behind "
+        "each, a run interpolates the motion"
     ]

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import codecs
 import csv
+import datetime
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
@@ -21,13 +23,14 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError, cut, shown
 from gms_fsm.foundation.arguments import meant, no_file
-from gms_fsm.foundation.quantities import UNITS, plain
+from gms_fsm.foundation.quantities import COLUMN_UNITS, plain
 from gms_fsm.records._columns import RENAME, Column
 
 LONGEST_LINE = 100_000  # characters
 LONGEST_FILE = 5_000_000  # rows
 SEARCHED = 200  # lines in which a header is looked for
 DELIMITERS = "\t;,| "
+THOUSANDS = ",. '’"
 # By its first bytes; other encodings have to be given.
 MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 
@@ -51,6 +54,10 @@ class TextFormat:
         The row of the column names; by default the first that has those asked for.
     encoding : str, optional
         By default UTF-8, or UTF-16 if the file begins with a byte order mark.
+    thousands : str, optional
+        What separates thousands.
+    columns : tuple of str, optional
+        The names of the columns of a table without a header.
     """
 
     delimiter: str | None = None
@@ -58,12 +65,22 @@ class TextFormat:
     comment: tuple[str, ...] = ("#", "%")
     header: int | None = None
     encoding: str | None = None
+    thousands: str | None = None
+    columns: tuple[str, ...] | None = None
 
     @classmethod
     def of(
-        cls, delimiter: Any, decimal: Any, comment: Any, header: Any, encoding: Any
+        cls,
+        delimiter: Any,
+        decimal: Any,
+        comment: Any,
+        header: Any,
+        encoding: Any,
+        thousands: Any = None,
+        columns: Any = None,
     ) -> TextFormat:
         """Return the format with these options, checked."""
+        names = None if columns is None or isinstance(columns, str) else tuple(columns)
         marks = (comment,) if isinstance(comment, str) else comment
         try:
             marks = tuple(marks)
@@ -85,13 +102,33 @@ class TextFormat:
                 encoding is None or _is_encoding(encoding),
                 "an encoding of text, for example 'cp1252', 'latin-1' or 'utf-16'",
             ),
+            "thousands": (
+                thousands is None or (thousands in tuple(THOUSANDS) and thousands != decimal),
+                "a comma, a point, a blank or an apostrophe, and not the decimal separator",
+            ),
+            "columns": (
+                columns is None or (bool(names) and all(isinstance(each, str) for each in names)),
+                "the names of all columns, for example ['t', 'x', 'F']",
+            ),
         }
         given = {"delimiter": delimiter, "decimal": decimal, "comment": comment}
         given |= {"header": header, "encoding": encoding}
+        given |= {"thousands": thousands, "columns": columns}
         for name, (fits, what) in wanted.items():
             if not fits:
                 raise ParameterError(f"it must be {what}", place=name, value=given[name])
-        return cls(delimiter, decimal, marks, header, encoding)
+        return cls(delimiter, decimal, marks, header, encoding, thousands, names)
+
+    def number(self, text: str) -> float:
+        """Return the number of a cell; raise a `ValueError` for a word."""
+        if self.thousands:
+            every = r"[\s\u00a0\u202f]" if self.thousands == " " else f"[{self.thousands}]"
+            if re.search(every, text.strip()):
+                whole, _, _rest = text.strip().partition(self.decimal)
+                if not re.fullmatch(rf"[-+]?\d{{1,3}}({every}\d{{3}})+", whole):
+                    raise ValueError
+                text = re.sub(every, "", whole) + text.strip()[len(whole) :]
+        return number(text, self.decimal)
 
     def cells(self, lines: Iterable[str], delimiter: str) -> Iterator[list[str]]:
         """Return the cells of lines."""
@@ -159,7 +196,10 @@ class _Head:
 def read_cells(path: Path, columns: Mapping[str, Column], form: TextFormat) -> Cells:
     """Read the named columns of a text table."""
     lines = _lines(path, form.encoding)
-    head = _head(path, lines, columns, form)
+    if form.columns is None:
+        head = _head(path, lines, columns, form)
+    else:
+        head, lines = _given_head(path, lines, form)
     places = _places(path, head, columns)
     notes = [f"the header is row {head.row}; the rows above are not read"] if head.row > 1 else []
     rows = _rows(path, lines, head, form)
@@ -171,20 +211,57 @@ def read_cells(path: Path, columns: Mapping[str, Column], form: TextFormat) -> C
     numbers: list[int] = []
     found: dict[str, list[float]] = {quantity: [] for quantity in columns}
     words: Words = {}
+    clock = _Clock()
     for at, row in rows:
         numbers.append(at)
         for quantity, place in places.items():
             try:
-                found[quantity].append(number(row[place], form.decimal))
+                found[quantity].append(form.number(row[place]))
             except ValueError:
-                found[quantity].append(math.nan)
-                words[at, quantity] = cut(row[place])
+                seconds = clock.seconds(row[place]) if quantity == "time" else math.nan
+                found[quantity].append(seconds)
+                if math.isnan(seconds):
+                    words[at, quantity] = cut(row[place])
+    if clock.first is not None:
+        if columns["time"].unit != "s" or clock.count < len(numbers) - len(words):
+            raise RecordError(
+                f"column {shown(columns['time'].name)} has times of a clock"
+                + (" and numbers" if columns["time"].unit == "s" else ""),
+                place=str(path),
+                advice="write one kind of times; those of a clock are read without a unit",
+                key=("time",),
+            )
+        notes.append("the times are those of a clock; they count from the first row")
     if len(numbers) < 2:
         raise RecordError(
             f"{len(numbers)} row(s) of data", place=str(path), advice="at least 2 are needed"
         )
     values = {quantity: np.array(each) for quantity, each in found.items()}
     return Cells(values, np.array(numbers), words, tuple(notes))
+
+
+class _Clock:
+    """Times of a clock, ISO 8601 or hh:mm:ss, as seconds since the first."""
+
+    def __init__(self) -> None:
+        self.first: datetime.datetime | None = None
+        self.count = 0
+
+    def seconds(self, text: str) -> float:
+        """Return the seconds since the first time; NaN for what is no time."""
+        text = text.strip().replace(",", ".")
+        if text.count(":") < 1:
+            return math.nan
+        if re.fullmatch(r"\d{1,2}:\d\d(:\d\d(\.\d*)?)?", text):
+            text = f"2000-01-01T{text.zfill(len(text) + (text.index(':') < 2))}"
+        try:
+            now = datetime.datetime.fromisoformat(text)
+            self.first = now if self.first is None else self.first
+            found = (now - self.first).total_seconds()
+        except (ValueError, TypeError):  # no time, or one with a zone and one without
+            return math.nan
+        self.count += 1
+        return found
 
 
 # --------------------------------------------------------------------------- lines
@@ -271,6 +348,26 @@ def _head(path: Path, lines: Lines, columns: Mapping[str, Column], form: TextFor
     return best
 
 
+def _given_head(path: Path, lines: Lines, form: TextFormat) -> tuple[_Head, Lines]:
+    """Return a header of given names, and the lines below it with the first row of numbers."""
+    assert form.columns is not None
+    for number, line in lines:
+        if number <= (form.header or 0) or not line.strip() or form.commented(line):
+            continue
+        for head in _readings(number, line, form):
+            if len(head.names) == len(form.columns):
+                given = _Head(number - 1, list(form.columns), head.delimiter)
+                return given, chain([(number, line)], lines)
+        counts = sorted({len(head.names) for head in _readings(number, line, form)})
+        raise RecordError(
+            f"row {number} has {' or '.join(map(str, counts))} cells, and columns names "
+            f"{len(form.columns)}",
+            place=str(path),
+            advice="name every column, or give their separator: delimiter = ...",
+        )
+    raise RecordError("the file is empty", place=str(path), advice="it must have rows of numbers")
+
+
 def _readings(number: int, line: str, form: TextFormat) -> Iterator[_Head]:
     """Yield the ways to read a line as a header; that of a program may be a comment."""
     if not line.strip():
@@ -304,7 +401,7 @@ def _places(path: Path, head: _Head, columns: Mapping[str, Column]) -> dict[str,
             else:
                 advice = meant(column.name, head.names) + advice
             if not any(each.isalpha() for each in "".join(head.names) if each not in "eE"):
-                advice = "the table has no names: write a line of names above the numbers"
+                advice = "the table has no names: give them, columns = ['t', 'x', ...]"
             elif len(head.names) == 1:
                 advice = "if these are several columns, give their separator: delimiter = ..."
             if not head.found(columns):
@@ -384,7 +481,7 @@ def _units(
     cells = {
         quantity: row[place].strip().strip("[]()").strip() for quantity, place in places.items()
     }
-    known = {unit for units in UNITS.values() for unit in units}
+    known = {unit for units in COLUMN_UNITS.values() for unit in units}
     if not any(plain(cell) in known for cell in cells.values()) or any(
         map(_is_number, cells.values())
     ):

@@ -27,10 +27,11 @@ HEADINGS = {
 def write_csv(columns: Mapping[str, FloatArray], path: str | os.PathLike[str]) -> Path:
     """Write columns of a record to a CSV file, whole."""
     place = checked_path("path", path)
-    names = [name for name in HEADINGS if name in columns]
+    inputs = [name for name in columns if name not in HEADINGS]
+    names = [*(name for name in HEADINGS if name in columns), *inputs]
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(HEADINGS[name] for name in names)
+    table.writerow(HEADINGS.get(name, name) for name in names)
     cells = np.stack([columns[name] for name in names], axis=1).tolist()
     # The repr of a float reads back equal.
     table.writerows(["" if cell != cell else repr(cell) for cell in row] for row in cells)

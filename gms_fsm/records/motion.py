@@ -18,7 +18,10 @@ from gms_fsm.errors import RecordError, cut, shown
 if TYPE_CHECKING:
     from gms_fsm.records.record import Record
 
-__all__ = ["Motion", "motion_of"]
+__all__ = ["GAP", "Motion", "motion_of", "pieces"]
+
+GAP = 5.0  # time steps longer than this many median steps are gaps
+FEWEST = 5  # rows of a spline
 
 STRETCH = 40  # rows per interval when searching for standstill
 
@@ -109,10 +112,8 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
             advice="give one of them: position = { column = ..., unit = ... } in a scenario, "
             "position=(name, unit) in Python",
         )
-    # The spline does not depend on the origin; subtracting the offset avoids cancellation.
-    shift = float(raw[0])
     try:
-        spline = make_smoothing_spline(time, raw - shift, lam=tau**4 / interval)
+        parts = [_smoothed(time[p], raw[p], tau**4 / interval) for p in pieces(time)]
     except (ArithmeticError, ValueError) as error:  # LinAlgError is a ValueError
         raise RecordError(
             f"no smoothing spline fits the {given} column ({cut(str(error))})",
@@ -120,9 +121,9 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
             advice="look for outliers in values or times and exclude their rows with "
             "where = ..., or change smoothing = ... (s)",
         ) from None
-    smooth = spline(time) + shift
+    smooth, slope = (np.concatenate(each) for each in zip(*parts, strict=True))
     if given == "position":
-        velocity, position = spline.derivative()(time), smooth
+        velocity, position = slope, smooth
         rest = float(np.std(raw - smooth))
         notes = [
             f"velocity: derivative of a smoothing spline through the positions, time constant "
@@ -145,6 +146,32 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
             advice="look for outliers, and exclude their rows with where = ...",
         )
     return Motion(time, velocity, position, tau, _standstill(velocity), tuple(notes))
+
+
+def pieces(time: FloatArray) -> list[slice]:
+    """Return the stretches of rows without a gap in time.
+
+    >>> pieces(np.array([0.0, 1.0, 2.0, 9.0, 10.0]))
+    [slice(0, 3, None), slice(3, 5, None)]
+    """
+    steps = np.diff(time)
+    if not steps.size:
+        return [slice(0, time.size)]
+    ends = np.flatnonzero(steps > GAP * np.median(steps)) + 1
+    return [
+        slice(int(a), int(b))
+        for a, b in zip([0, *ends.tolist()], [*ends.tolist(), time.size], strict=True)
+    ]
+
+
+def _smoothed(time: FloatArray, raw: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
+    """Return values and slopes of a smoothing spline through a stretch of rows."""
+    if time.size < FEWEST:
+        return raw, np.gradient(raw, time) if time.size > 1 else np.zeros(1)
+    # The spline does not depend on the origin; subtracting the offset avoids cancellation.
+    shift = float(raw[0])
+    spline = make_smoothing_spline(time, raw - shift, lam=weight)
+    return spline(time) + shift, spline.derivative()(time)
 
 
 def _standstill(velocity: FloatArray) -> float:

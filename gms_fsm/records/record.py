@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -18,7 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError, RecordError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, checked_path, meant, refusing
-from gms_fsm.records._columns import QUANTITIES, RENAME, Column, ColumnLike, columns_of
+from gms_fsm.records._columns import (
+    QUANTITIES,
+    RENAME,
+    Column,
+    ColumnLike,
+    checked_inputs,
+    columns_of,
+    mixed,
+)
 from gms_fsm.records._selection import FEWEST, Origin, selected
 from gms_fsm.records._table import TextFormat, Words, number, read_cells
 from gms_fsm.records._written import write_csv
@@ -40,7 +48,8 @@ class Record:
     name : str
         For tables and messages; of a file its name without the ending.
     columns : mapping of str to ndarray, shape (rows,)
-        ``time`` and any of ``position``, ``velocity``, ``force``, ``normal``; read-only.
+        ``time`` and any of ``position``, ``velocity``, ``force``, ``normal``, and the inputs by
+        their names; read-only.
     chosen : ndarray of bool, shape (rows,)
         The selected rows; the motion runs from the first to the last of them.
     rows : ndarray of int, shape (rows,)
@@ -80,7 +89,8 @@ class Record:
         time = self.columns["time"]
         count = int(self.chosen.sum())
         chosen = f" ({count} selected)" if count < len(self) else ""
-        held = ", ".join(name for name in QUANTITIES if name in self.columns and name != "time")
+        names = [*QUANTITIES, *self.inputs]
+        held = ", ".join(name for name in names if name in self.columns and name != "time")
         return (
             f"<Record {cut(repr(self.name))}: {len(self)} rows{chosen}, "
             f"{float(np.ptp(time)):.6g} s, {held}>"
@@ -90,6 +100,11 @@ class Record:
     def place(self) -> str:
         """Where it comes from, for messages: the file, or its name."""
         return f"record {shown(self.name)}" if self.path is None else str(self.path)
+
+    @property
+    def inputs(self) -> Mapping[str, FloatArray]:
+        """What the record gives to inputs of charts, by their names."""
+        return {name: value for name, value in self.columns.items() if name not in QUANTITIES}
 
     @cached_property
     def _motions(self) -> dict[float | None, Motion]:
@@ -198,12 +213,17 @@ class Record:
         velocity: ColumnLike | None = None,
         force: ColumnLike | None = ("F_N", "N"),
         normal: ColumnLike | None = None,
+        inputs: Mapping[str, ColumnLike] | None = None,
         where: str = "",
         missing: Missing = "error",
+        sort: bool = False,
+        duplicates: Literal["error", "mean"] = "error",
         delimiter: str | None = None,
         decimal: Literal[".", ","] = ".",
+        thousands: str | None = None,
         comment: str | Sequence[str] = ("#", "%"),
         header: int | None = None,
+        columns: Sequence[str] | None = None,
         encoding: str | None = None,
         name: str | None = None,
     ) -> Record:
@@ -214,19 +234,29 @@ class Record:
         path : str or Path
             The file.
         time, position, velocity, force, normal : str, tuple or Column, optional
-            The column of each quantity: its name (the unit is that of SI), ``(name, unit)`` or
-            ``(name, unit, sign)`` with a sign of -1 to reverse it. None if there is no such column.
+            The column of each quantity: its name (the unit is that of SI, or stands in brackets at
+            the end of the name), ``(name, unit)`` or ``(name, unit, sign)`` with a sign of -1 to
+            reverse it. None if there is no such column.
+        inputs : mapping of str to (str, tuple or Column), optional
+            Columns for inputs of charts, by their names: ``{"N": ("load", "kN")}``.
         where : str, optional
             Condition on the quantities that selects rows, for example ``"normal > 4.5 N"``. It is
             evaluated first: a cell in a row that is not selected need not be a number.
         missing : {"error", "drop", "interpolate"}
-            What to do where a cell is empty or NaN in a row that is used: refuse it, leave the row
-            out, or interpolate in time. The last two are noted.
+            What to do where a cell is empty, NaN or a word such as OVR in a row that is used: refuse
+            it, leave the row out, or interpolate in time. With the last two a row without a force
+            keeps its motion and is not compared; nor is one whose motion was interpolated.
+        sort : bool
+            Whether to sort the rows by time.
+        duplicates : {"error", "mean"}
+            What to do with rows of the same time: refuse them, or use their means.
         delimiter : str, optional
             One character; by default tab, semicolon, comma, bar or space, whichever gives the named
             columns.
         decimal : {".", ","}
             The decimal separator.
+        thousands : {",", ".", " ", "'"}, optional
+            The separator of thousands.
         comment : str or sequence of str
             What comment lines begin with.
         header : int, optional
@@ -270,24 +300,25 @@ class Record:
         row 3 is a line of units: s, mm
         """
         given = {"time": time, "position": position, "velocity": velocity}
-        columns = columns_of(given | {"force": force, "normal": normal})
+        found = columns_of(given | {"force": force, "normal": normal}, inputs)
         if hasattr(path, "columns"):
             advice = "Record.from_dataframe(frame, time=..., position=..., force=...) reads it"
             raise ParameterError("it is no file", place="path", value=path, advice=advice)
         file = checked_path("path", path)
-        if "time" not in columns:
+        if "time" not in found:
             raise RecordError(
                 "no column is given for 'time'", place=str(file), advice="give time = ..."
             )
-        form = TextFormat.of(delimiter, decimal, comment, header, encoding)
-        cells = read_cells(file, columns, form)
-        origin = Origin(str(file), {quantity: each.name for quantity, each in columns.items()})
+        form = TextFormat.of(delimiter, decimal, comment, header, encoding, thousands, columns)
+        cells = read_cells(file, found, form)
+        origin = Origin(str(file), {quantity: each.name for quantity, each in found.items()})
         values = {
             quantity: column.in_si(quantity, cells.numbers[quantity])
-            for quantity, column in columns.items()
+            for quantity, column in found.items()
         }
-        part = selected(origin, values, cells.rows, cells.words, where, missing)
-        notes = (*cells.notes, *part.notes)
+        options: Any = {"sort": sort, "duplicates": duplicates}
+        part = selected(origin, values, cells.rows, cells.words, where, missing, **options)
+        notes = (*cells.notes, *_noted_units(found), *part.notes)
         called = file.stem if name is None else checked_kind("name", name, str, "a text")
         return cls(called, part.columns, part.chosen, part.rows, notes, file)
 
@@ -300,7 +331,10 @@ class Record:
         velocity: ArrayLike | None = None,
         force: ArrayLike | None = None,
         normal: ArrayLike | None = None,
+        inputs: Mapping[str, ArrayLike] | None = None,
         missing: Missing = "error",
+        sort: bool = False,
+        duplicates: Literal["error", "mean"] = "error",
         name: str = "arrays",
     ) -> Record:
         """Make a record from arrays in SI units.
@@ -313,8 +347,10 @@ class Record:
             m and m/s; at least one of them is needed.
         force, normal : array_like, shape (rows,), optional
             Measured friction and normal force, N.
-        missing : {"error", "drop", "interpolate"}
-            What to do with NaN, as in `from_csv`.
+        inputs : mapping of str to array_like, optional
+            What inputs of charts are, by their names: ``{"N": load}``.
+        missing, sort, duplicates
+            As in `from_csv`.
         name : str
             For tables and messages.
 
@@ -343,13 +379,15 @@ class Record:
             raise RecordError(
                 "neither position nor velocity is given", place=place, advice="give one of them"
             )
+        given |= checked_inputs(inputs)
         values = {
             quantity: _numbers(place, quantity, each)
             for quantity, each in given.items()
             if each is not None or quantity == "time"
         }
         origin = Origin(place, {quantity: quantity for quantity in values}, "arrays")
-        return cls._from_numbers(origin, values, "", missing, name, {})
+        options = {"missing": missing, "sort": sort, "duplicates": duplicates}
+        return cls._from_numbers(origin, values, {}, name, options)
 
     @classmethod
     def from_dataframe(
@@ -361,8 +399,11 @@ class Record:
         velocity: ColumnLike | None = None,
         force: ColumnLike | None = ("F_N", "N"),
         normal: ColumnLike | None = None,
+        inputs: Mapping[str, ColumnLike] | None = None,
         where: str = "",
         missing: Missing = "error",
+        sort: bool = False,
+        duplicates: Literal["error", "mean"] = "error",
         name: str = "frame",
     ) -> Record:
         """Make a record from a pandas DataFrame.
@@ -371,7 +412,7 @@ class Record:
         ----------
         frame : pandas.DataFrame
             Or another table with ``columns`` and ``frame[name]``.
-        time, position, velocity, force, normal, where, missing
+        time, position, velocity, force, normal, inputs, where, missing, sort, duplicates
             As in `from_csv`.
         name : str
             For tables and messages.
@@ -387,7 +428,7 @@ class Record:
             As in `from_csv`; rows count from 0.
         """
         given = {"time": time, "position": position, "velocity": velocity}
-        columns = columns_of(given | {"force": force, "normal": normal})
+        columns = columns_of(given | {"force": force, "normal": normal}, inputs)
         checked_kind("name", name, str, "a text")
         place = f"record {shown(name)}"
         if "time" not in columns:
@@ -401,17 +442,18 @@ class Record:
         }
         names = {quantity: column.name for quantity, column in columns.items()}
         origin = Origin(place, names, "frame")
-        return cls._from_numbers(origin, values, where, missing, name, words)
+        options = {"where": where, "missing": missing, "sort": sort, "duplicates": duplicates}
+        found = cls._from_numbers(origin, values, words, name, options)
+        return replace(found, notes=(*_noted_units(columns), *found.notes))
 
     @classmethod
     def _from_numbers(
         cls,
         origin: Origin,
         values: dict[str, FloatArray],
-        where: str,
-        missing: str,
-        name: str,
         words: Words,
+        name: str,
+        options: Mapping[str, Any],
     ) -> Record:
         size = values["time"].size
         for quantity, value in values.items():
@@ -423,8 +465,14 @@ class Record:
                 )
         if not size:
             raise RecordError("time is empty", place=origin.place, advice="give some rows")
-        part = selected(origin, values, np.arange(size), words, where, missing)
+        part = selected(origin, values, np.arange(size), words, **options)
         return cls(name, part.columns, part.chosen, part.rows, tuple(part.notes))
+
+
+def _noted_units(columns: Mapping[str, Column]) -> tuple[str, ...]:
+    """Return a note if angles stand beside lengths."""
+    odd = mixed({quantity: column.unit for quantity, column in columns.items()})
+    return (f"{odd}: their product is no power",) if odd else ()
 
 
 def _numbers(place: str, quantity: str, given: Any) -> FloatArray:

@@ -7,7 +7,7 @@ A model on a rig is a system with one contact and one body, which have no names 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -169,12 +169,17 @@ class Mounted:
         """Return what is seen of one contact: like a model, which has no names."""
         return replace(self, model=self.system.contact(contact), named=False)
 
-    def driven(self, name: str, signal: Signal) -> Mounted:
-        """Return the same with another signal; of a model its velocity, whatever moved it."""
+    def driven(self, signals: Mapping[str, Signal]) -> Mounted:
+        """Return the same with other signals; of a model its velocity v, whatever moved it."""
         if self.named:
-            system = replace(self.system, signals={**self.system.signals, name: signal})
-            return mounted(system)
-        return mounted(self.model, Prescribed(signal))
+            return mounted(replace(self.system, signals={**self.system.signals, **signals}))
+        others = {name: signal for name, signal in signals.items() if name != "v"}
+        return mounted(self.model, Prescribed(signals["v"], others))
+
+    @property
+    def bindable(self) -> tuple[str, ...]:
+        """The names that inputs of a record can have: inputs of the model, signals of a system."""
+        return (*self.system.signals,) if self.named else (*getattr(self.model, "inputs", {}),)
 
 
 def mounted(model: Model | System, rig: Rig | None = None, period: float | None = None) -> Mounted:
@@ -210,6 +215,9 @@ def mounted(model: Model | System, rig: Rig | None = None, period: float | None 
                 advice=misplaced(given),
             )
     assert rig is not None
+    if bound := {*getattr(rig, "inputs", {})} & {*getattr(model, "inputs", {})}:
+        own: Any = model
+        model = replace(own, inputs={**own.inputs, **{name: name for name in bound}})
     return Mounted(system_of(model, rig, period), model, rig, named=False)
 
 
@@ -243,8 +251,13 @@ def misplaced(given: object) -> str:
     return known or (table if hasattr(given, "columns") else "")
 
 
-def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
-    """Return a system, or a model whose velocity is still to be given, as the signal v."""
+def mounted_alone(
+    model: Model | System, place: str = "model", inputs: Iterable[str] = ()
+) -> Mounted:
+    """Return a system, or a model whose velocity is still to be given, as the signal v.
+
+    So are the inputs with these names, if it has them.
+    """
     if isinstance(model, System):
         return mounted(model)
     if not is_model(model):
@@ -254,7 +267,8 @@ def mounted_alone(model: Model | System, place: str = "model") -> Mounted:
             value=model,
             advice=misplaced(model),
         )
-    return mounted(model, Prescribed("0"))
+    own = getattr(model, "inputs", {})
+    return mounted(model, Prescribed("0", {name: "1" for name in inputs if name in own}))
 
 
 def contact_of(what: object, name: str) -> tuple[Contact, Assembly | None]:

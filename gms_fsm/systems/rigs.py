@@ -17,6 +17,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.display import short_repr
 from gms_fsm.foundation.equality import by_value
+from gms_fsm.records.record import Record
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring
 
@@ -56,7 +57,11 @@ class Prescribed:
     Parameters
     ----------
     velocity : signal
-        v(t), m/s: an expression in t, ramps, a record or a callable.
+        v(t), m/s: an expression in t, ramps, arrays or a callable; or a `Record`, which gives its
+        motion and its inputs.
+    inputs : mapping of str to signal, optional
+        Inputs of the chart, by their names: a load ``{"N": "10 + sin(t)"}``. They replace what the
+        model gives to these.
 
     Examples
     --------
@@ -64,7 +69,8 @@ class Prescribed:
     'prescribed velocity'
     """
 
-    velocity: SignalLike = field(compare=False)
+    velocity: SignalLike | Record = field(compare=False)
+    inputs: Mapping[str, SignalLike] = field(default_factory=dict, compare=False)
     signals: Mapping[str, Signal] = field(init=False, repr=False)
 
     title = "prescribed velocity"
@@ -72,7 +78,14 @@ class Prescribed:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "signals", {"v": as_signal(self.velocity)})
+        velocity, given = self.velocity, self.inputs
+        if isinstance(velocity, Record):
+            motion = velocity.motion()
+            given = {n: (motion.time, u) for n, u in velocity.inputs.items()} | dict(given)
+            velocity = (motion.time, motion.velocity)
+        found = {name: as_signal(each) for name, each in given.items()}
+        object.__setattr__(self, "inputs", found)
+        object.__setattr__(self, "signals", {"v": as_signal(velocity), **found})
 
     @property
     def numbers(self) -> Mapping[str, float]:

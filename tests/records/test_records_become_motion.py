@@ -44,6 +44,9 @@ EXPECTED = {
 }
 EXPECTED["velocity"] |= {"nm/s": 1e-9}
 EXPECTED["force"] |= {"lbf": 4.4482216152605}
+EXPECTED["position"] |= {"rad": 1, "mrad": 1e-3, "deg": np.pi / 180, "°": np.pi / 180}
+EXPECTED["velocity"] |= {"rad/s": 1, "mrad/s": 1e-3, "deg/s": np.pi / 180, "rpm": np.pi / 30}
+EXPECTED["force"] |= {"Nm": 1, "kNm": 1e3, "mNm": 1e-3, "mN·m": 1e-3}
 EXPECTED["normal"] = EXPECTED["force"]
 
 

@@ -191,7 +191,7 @@ def _chosen(
 def _refined(records: Sequence[Record], smoothing: float | None, before: Fit) -> Predictor:
     given = before.task.options
     start = FitStart(before.model, given.free, given.tied, given.bounds)
-    return _predictor(_fit(records, start, smoothing, "local", before.begin))
+    return _predictor(_fit(records, start, smoothing, "local", before.task.begin))
 
 
 def _fit(

@@ -274,7 +274,7 @@ def _in_values(
 def _basis(experiment: Experiment, point: Point) -> FloatArray:
     subject = experiment.reference(experiment.coordinates.numbers(point.u))
     columns = [experiment.columns(subject, course)[2][course.rows] for course in experiment.courses]
-    return np.concatenate(columns)
+    return experiment.weighted(columns)
 
 
 def _searched_slopes(
@@ -291,7 +291,7 @@ def _searched_slopes(
                 parts.append((rest + columns @ point.linear)[course.rows])
         except LOST:
             return None
-        return np.concatenate(parts)
+        return experiment.weighted(parts)
 
     moves = [step * unit for step, unit in zip(steps, np.eye(steps.size), strict=True)]
     forward = pool.map(force, [point.u + move for move in moves])

@@ -18,7 +18,7 @@ from gms_fsm.identification.certainty.statistics import BLOCK
 from gms_fsm.identification.problem.experiment import Experiment, Point
 from gms_fsm.identification.problem.runs import ThreadPool
 from gms_fsm.identification.problem.search import Best, hops, refine
-from gms_fsm.identification.problem.task import Task, at_all_rows
+from gms_fsm.identification.problem.task import Task, at_course
 from gms_fsm.identification.problem.unknowns import Unknown
 
 __all__ = ["Bootstrap", "Profile", "bootstrapped", "profiled"]
@@ -186,7 +186,7 @@ def bootstrapped(
     if block is not None:
         block = checked_scalar("block", block, "> 0")
     rng = np.random.default_rng(seed)
-    modelled = [at_all_rows(task.fine, point, course) for course in task.courses]
+    modelled = [at_course(task.fine, point, course) for course in task.courses]
     found = np.full((draws, len(names)), np.nan)
     with ThreadPool() as pool:
         for draw in range(draws):

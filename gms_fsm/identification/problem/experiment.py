@@ -50,7 +50,7 @@ class Point:
     linear : ndarray
         What was solved for: the linear parameters, then the nuisance terms.
     residual : ndarray, shape (rows,)
-        Model minus measurement, at the rows that count.
+        Model minus measurement, at the rows that count, weighted.
     lost : GMSError or None
         Why it could not be evaluated.
     """
@@ -88,6 +88,8 @@ class Experiment:
         What is compared.
     ran : list of int
         One number: how many runs were made.
+    weights : tuple of float
+        What a residual of each course counts; empty for 1.
     """
 
     subject: Mounted
@@ -99,6 +101,7 @@ class Experiment:
     driver: Driver
     measured: ComparedColumn
     ran: list[int]
+    weights: tuple[float, ...] = ()
 
     @property
     def order(self) -> tuple[Unknown, ...]:
@@ -113,8 +116,20 @@ class Experiment:
 
     @cached_property
     def target(self) -> FloatArray:
-        """The measured values at the rows that count."""
-        return np.concatenate([each.measured[each.rows] for each in self.courses])
+        """The measured values at the rows that count, weighted."""
+        return self.weighted([each.measured[each.rows] for each in self.courses])
+
+    def weighted(self, parts: Sequence[FloatArray], power: float = 1.0) -> FloatArray:
+        """Return the values at the rows of all courses, times their weights."""
+        if not self.weights:
+            return np.concatenate(list(parts))
+        every = zip(parts, self.weights, strict=True)
+        return np.concatenate([part * weight**power for part, weight in every])
+
+    def unweighted(self, values: FloatArray) -> FloatArray:
+        """Return values without their weights."""
+        ends = np.cumsum([int(each.rows.sum()) for each in self.courses])[:-1]
+        return self.weighted(np.split(values, ends), -1.0)
 
     @cached_property
     def typical(self) -> float:
@@ -169,8 +184,8 @@ class Experiment:
                 _, rest, columns = self.columns(subject, course)
                 parts.append(columns[course.rows])
                 rests.append(rest[course.rows])
-            basis = np.concatenate(parts)
-            wanted = self.target - np.concatenate(rests)
+            basis = self.weighted(parts)
+            wanted = self.target - self.weighted(rests)
             if not (np.isfinite(basis).all() and np.isfinite(wanted).all()):
                 raise ArithmeticError("the force is not finite")
             linear = self._solved(basis, wanted)

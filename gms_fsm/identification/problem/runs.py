@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import GMSError, MissingExtraError, ParameterError, shown
+from gms_fsm.errors import GMSError, MissingExtraError, ParameterError, RecordError, shown
 from gms_fsm.foundation.arguments import some_of, unknown
 from gms_fsm.foundation.quantities import per_second
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.program import Program, arguments, same_text
+from gms_fsm.records.motion import pieces
 from gms_fsm.records.record import Record
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
@@ -35,7 +36,9 @@ from gms_fsm.traces.observed import Observed
 from gms_fsm.traces.trace import Trace
 
 BEGINS = ("relaxed", "run in")
+MOVING = "run in from motion"  # a record that begins at rest is taken to be relaxed
 COVERED = 0.9  # share of the travel that a run-in must cover
+AT_REST = 1e-2  # of the highest speed
 NEAR = 0.02  # of the travel: where the motion is back at its start
 STEPS_PER_ROW = 60  # default budget of a run
 FEWEST_STEPS = 200_000
@@ -134,6 +137,13 @@ class Course:
         Times and velocities before the first row: the run-in; empty without one.
     budget : int
         Steps a run may take.
+    inputs : mapping of str to tuple of ndarray
+        What the record gives to inputs of the chart, in the run-in and at the rows.
+    initial : mapping
+        The initial state; empty for that of the chart.
+    known : bool
+        Whether the state at the first row is known: the motion begins there, at rest, or a run-in
+        leads to it.
     """
 
     record: Record
@@ -144,14 +154,23 @@ class Course:
     rows: NDArray[np.bool_]
     lead: tuple[FloatArray, FloatArray]
     budget: int
+    inputs: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    initial: Mapping[str, Any] = field(default_factory=dict)
+    known: bool = True
 
     @cached_property
     def signal(self) -> Corners:
         """The velocity, with the run-in."""
-        times, values = self.lead
-        return Corners(
-            np.concatenate([times, self.t]), np.concatenate([values, self.v]), held=False
-        )
+        return self._over_time(self.lead[1], self.v)
+
+    @cached_property
+    def given(self) -> dict[str, Corners]:
+        """The inputs, with the run-in."""
+        return {name: self._over_time(*values) for name, values in self.inputs.items()}
+
+    def _over_time(self, before: FloatArray, values: FloatArray) -> Corners:
+        times = np.concatenate([self.lead[0], self.t])
+        return Corners(times, np.concatenate([before, values]), held=False)
 
     @cached_property
     def acceleration(self) -> FloatArray:
@@ -162,9 +181,14 @@ class Course:
         """Return the same course with every n-th row only."""
         if every <= 1:
             return self
-        kept = slice(None, None, every)
-        times, values = self.lead
-        lead = times[::-1][every - 1 :: every][::-1], values[::-1][every - 1 :: every][::-1]
+        def fewer(before: FloatArray) -> FloatArray:
+            return before[::-1][every - 1 :: every][::-1]
+
+        found = self._with_rows(slice(None, None, every))
+        inputs = {name: (fewer(before), u) for name, (before, u) in found.inputs.items()}
+        return replace(found, lead=(fewer(self.lead[0]), fewer(self.lead[1])), inputs=inputs)
+
+    def _with_rows(self, kept: slice) -> Course:
         return replace(
             self,
             t=self.t[kept],
@@ -172,24 +196,21 @@ class Course:
             x=self.x[kept],
             measured=self.measured[kept],
             rows=self.rows[kept],
-            lead=lead,
+            inputs={name: (before, u[kept]) for name, (before, u) in self.inputs.items()},
         )
+
+    def begun(self, initial: Mapping[str, Any]) -> Course:
+        """Return the same course from a given state, without a run-in."""
+        nothing = np.empty(0)
+        inputs = {name: (nothing, u) for name, (_, u) in self.inputs.items()}
+        return replace(self, lead=(nothing, nothing), inputs=inputs, initial=initial)
 
     def ended(self) -> Course:
         """Return the same course up to the last row that counts."""
-        last = int(np.flatnonzero(self.rows)[-1]) + 1
-        cut = slice(None, last)
-        return replace(
-            self,
-            t=self.t[cut],
-            v=self.v[cut],
-            x=self.x[cut],
-            measured=self.measured[cut],
-            rows=self.rows[cut],
-        )
+        return self._with_rows(slice(None, int(np.flatnonzero(self.rows)[-1]) + 1))
 
 
-def course_of(
+def courses_of(
     record: Record,
     column: str,
     *,
@@ -198,46 +219,72 @@ def course_of(
     begin: str,
     most_steps: int | None,
     seen: int | None = None,
-) -> Course:
-    """Return what a record makes a model do."""
+    inputs: Sequence[str] = (),
+) -> list[Course]:
+    """Return what a record makes a model do: one course for each stretch without a gap in time.
+
+    A stretch of one row alone is none.
+    """
+    for name in inputs:
+        if name not in record.inputs:
+            raise RecordError(
+                f"it gives no input {name!r}, which the model reads",
+                place=record.place,
+                advice=f"give inputs={{{name!r}: ...}} when making the record",
+            )
     motion = record.motion(smoothing)
-    nothing = np.empty(0)
-    first = slice(seen)
-    lead = None
-    if begin == "run in":
-        lead = _run_in(motion.time[first], motion.position[first], motion.velocity[first])
-    times, values = (nothing, nothing) if lead is None else lead
-    count = motion.time.size + times.size
-    return Course(
-        record,
-        motion.time,
-        motion.velocity,
-        motion.position,
-        record.columns.get(column, np.full(motion.time.size, np.nan)),
-        record.chosen if rows is None else rows & record.chosen,
-        (times, values),
-        max(FEWEST_STEPS, STEPS_PER_ROW * count) if most_steps is None else most_steps,
-    )
+    every = record.chosen if rows is None else rows & record.chosen
+    force = record.columns.get(column, np.full(motion.time.size, np.nan))
+    fastest = float(np.abs(motion.velocity).max())
+    found = []
+    for part in pieces(motion.time):
+        if part.stop - part.start < 2:
+            continue
+        t, x, v = motion.time[part], motion.position[part], motion.velocity[part]
+        last = 0
+        still = part.start == 0 and abs(v[0]) < AT_REST * fastest
+        if begin == BEGINS[1] or (begin == MOVING and not still):
+            until = None if seen is None else max(seen - part.start, 0)
+            last = _run_in(t[:until], x[:until], v[:until])
+        lead = t[:last] - (t[last] - t[0]), v[:last]
+        given = {name: record.inputs[name][part] for name in inputs}
+        count = t.size + last
+        found.append(
+            Course(
+                record,
+                t,
+                v,
+                x,
+                force[part],
+                every[part],
+                lead,
+                max(FEWEST_STEPS, STEPS_PER_ROW * count) if most_steps is None else most_steps,
+                {name: (u[:last], u) for name, u in given.items()},
+                known=bool(last) or still,
+            )
+        )
+    return found
 
 
-def _run_in(t: FloatArray, x: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Return times and velocities of a first pass, to put before the record.
+def _run_in(t: FloatArray, x: FloatArray, v: FloatArray) -> int:
+    """Return how many rows make a first pass, to put before the record; 0 if there is none.
 
     It ends where the motion is back at its starting position in the same direction after covering
-    its travel, so that position and velocity continue; None if it never is, or begins at rest.
+    its travel, so that position and velocity continue.
     """
-    travel, fastest = float(np.ptp(x)), float(np.abs(v).max())
-    if travel == 0.0 or abs(v[0]) < 1e-2 * fastest:
-        return None
+    travel, fastest = float(np.ptp(x)) if x.size else 0.0, float(np.abs(v).max(initial=0.0))
+    if travel == 0.0:
+        return 0
+    moving = np.flatnonzero(np.abs(v) >= AT_REST * fastest)
+    onward = v[moving[0]]  # a motion that begins at rest continues in the way it then takes
     covered = np.maximum.accumulate(x) - np.minimum.accumulate(x) >= COVERED * travel
-    back = covered & (np.abs(x - x[0]) <= NEAR * travel) & (v * v[0] > 0.0)
+    back = covered & (np.abs(x - x[0]) <= NEAR * travel) & (v * onward > 0.0)
     found = np.flatnonzero(back)
     if not found.size:
-        return None
+        return 0
     # The nearest of the first passage.
     passage = found[found < found[0] + max(2, t.size // 20)]
-    last = int(passage[np.argmin(np.abs(x[passage] - x[0]))])
-    return t[:last] - t[last] + t[0], v[:last]
+    return int(passage[np.argmin(np.abs(x[passage] - x[0]))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,16 +358,17 @@ class Driver:
 
     def driven(self, subject: Mounted, course: Course) -> Mounted:
         """Return a subject that the motion of a course drives."""
-        return subject.driven(self.drive, course.signal) if self.drive else subject
+        signals = course.given | ({self.drive: course.signal} if self.drive else {})
+        return subject.driven(signals) if signals else subject
 
     def start(self, subject: Mounted, course: Course) -> Problem:
         """Return the start of a run along a course."""
         settings = Settings(
             engine=engine(), rtol=self.rtol, t_eval=course.t, max_steps=course.budget * self.budgets
         )
-        first = course.signal.times[0] if self.drive else course.t[0]
-        what = self.driven(subject, course)
-        return Problem.on(what, float(course.t[-1]), settings, t_start=float(first))
+        first = float(course.signal.times[0] if self.drive else course.t[0])
+        what, end = self.driven(subject, course), float(course.t[-1])
+        return Problem.on(what, end, settings, t_start=first, initial=dict(course.initial))
 
 
 def driver_of(subject: Mounted, drive: str | None, rtol: float, budgets: int) -> Driver:

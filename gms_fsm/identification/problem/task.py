@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,10 +16,11 @@ from gms_fsm.identification.problem.experiment import Experiment, Point, split_u
 from gms_fsm.identification.problem.linear import linear_names
 from gms_fsm.identification.problem.runs import (
     BEGINS,
+    MOVING,
     ComparedColumn,
     Course,
     ThreadPool,
-    course_of,
+    courses_of,
     driver_of,
 )
 from gms_fsm.identification.problem.search import Best, de, hops, refine
@@ -34,6 +36,8 @@ FINE_STEPS = (1e-3, 1e-4)
 # What ran in the search must run with all rows and the small tolerance, too: these runs are few,
 # and may take more steps.
 FINE_BUDGETS = 10
+WEIGHTS = ("rows", "records")
+UNEVEN = 3.0  # the longest record over the shortest, from which on records count alike
 DISTANT = 0.02  # relative: how much better the other beginning must be
 
 
@@ -56,6 +60,7 @@ class FitOptions:
     most_steps: int | None = None
     smoothing: float | None = None
     begin: str | None = None
+    weight: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +77,8 @@ class Task:
         The arguments.
     begin : str
         What is before the first row of a record.
+    starts : mapping of int to mapping
+        Initial states that were estimated, by the number of the course.
     ran : list of int
         One number: how many runs were made.
     """
@@ -79,7 +86,8 @@ class Task:
     subject: Mounted
     records: tuple[Record, ...]
     options: FitOptions
-    begin: str = BEGINS[1]
+    begin: str = MOVING
+    starts: Mapping[int, Mapping[str, FloatArray]] = field(default_factory=dict)
     ran: list[int] = field(default_factory=lambda: [0])
 
     @cached_property
@@ -98,18 +106,20 @@ class Task:
         """The records with the rows to train on, up to the last of them."""
         found = []
         for record in self.records:
-            course = self.course(record, training_rows(record, self.options))
-            if course.rows.any():
-                found.append(course.ended())
-        return tuple(found)
+            along = self.along(record, training_rows(record, self.options))
+            found += [each.ended() for each in along if each.rows.any()]
+        return tuple(
+            each if (start := self.starts.get(i)) is None else each.begun(start)
+            for i, each in enumerate(found)
+        )
 
-    def course(self, record: Record, rows: NDArray[np.bool_] | None) -> Course:
+    def along(self, record: Record, rows: NDArray[np.bool_] | None) -> list[Course]:
         """Return what a record makes the model do, with the rows that count (None: all)."""
         given, seen = self.options, None
         if any(record is each for each in self.records):  # its run-in was that of training rows
             known = np.flatnonzero(training_rows(record, given) & record.chosen)
             seen = int(known[-1]) + 1 if known.size else None
-        return course_of(
+        return courses_of(
             record,
             self.measured.column,
             rows=rows,
@@ -117,7 +127,14 @@ class Task:
             begin=self.begin,
             most_steps=given.most_steps,
             seen=seen,
+            inputs=self.bound,
         )
+
+    @property
+    def bound(self) -> tuple[str, ...]:
+        """The inputs of the records that the model reads."""
+        given = {name for record in self.records for name in record.inputs}
+        return tuple(name for name in self.subject.bindable if name in given)
 
     # ------------------------------------------------------------------ as least squares
     @cached_property
@@ -152,7 +169,22 @@ class Task:
             driver,
             self.measured,
             self.ran,
+            self._weights(courses),
         )
+
+    def _weights(self, courses: Sequence[Course]) -> tuple[float, ...]:
+        """Return what a residual of each course counts, so that records count alike if asked."""
+        rows: dict[int, int] = {}
+        for course in courses:
+            rows[id(course.record)] = rows.get(id(course.record), 0) + int(course.rows.sum())
+        counts = list(rows.values())
+        equal = self.options.weight == "records"
+        if self.options.weight is None:
+            equal = max(counts) > UNEVEN * min(counts)
+        if not equal or len(counts) < 2:
+            return ()
+        mean = sum(counts) / len(counts)
+        return tuple(math.sqrt(mean / rows[id(course.record)]) for course in courses)
 
     def beginning(self, begin: str) -> Task:
         """Return the same task with another beginning."""
@@ -182,14 +214,16 @@ class Task:
         """Return the task with the beginning that fits better, if the user did not say."""
         if self.options.begin is not None or best.point is None:
             return self
-        if not any(course.lead[0].size for course in self.courses):
-            return self  # no record has begun in motion, and the data say nothing
-        other = self.beginning(BEGINS[0])
-        there = other.coarse.at(best.point.u)
-        if there.lost is None and there.cost < (1.0 - DISTANT) * best.point.cost:
-            best.point = there
-            return other
-        return self
+        found = self
+        for begin in BEGINS:
+            other = self.beginning(begin)
+            pairs = zip(other.courses, self.courses, strict=True)
+            if all(one.lead[0].size == own.lead[0].size for one, own in pairs):
+                continue  # the same runs
+            there = other.coarse.at(best.point.u)
+            if there.lost is None and there.cost < (1.0 - DISTANT) * best.point.cost:
+                best.point, found = there, other
+        return found
 
     def polish(self, u: FloatArray, best: Best, pool: ThreadPool) -> None:
         """Refine on all rows, with smaller and smaller steps."""
@@ -243,8 +277,19 @@ def stretches(courses: Sequence[Course], residual: FloatArray) -> list[FloatArra
     return [each for each in found if each.size]
 
 
-def at_all_rows(experiment: Experiment, point: Point, course: Course) -> FloatArray:
-    """Return the modelled values at all rows of a course, nuisance terms included."""
+def at_course(experiment: Experiment, point: Point, course: Course) -> FloatArray:
+    """Return the modelled values at the rows of a course, nuisance terms included."""
     subject = experiment.reference(experiment.coordinates.numbers(point.u))
     _, rest, columns = experiment.columns(subject, course)
-    return rest + columns @ point.linear
+    found: FloatArray = rest + columns @ point.linear
+    return found
+
+
+def at_all_rows(experiment: Experiment, point: Point, courses: Sequence[Course]) -> FloatArray:
+    """Return the modelled values at all rows of a record; NaN where a row is part of no course."""
+    time = courses[0].record.columns["time"]
+    found = np.full(time.size, np.nan)
+    for course in courses:
+        place = int(np.searchsorted(time, course.t[0]))
+        found[place : place + course.t.size] = at_course(experiment, point, course)
+    return found

@@ -65,7 +65,7 @@ class RigTable(Table):
         signals: Any = {name: signal_of(name, each) for name, each in self.signals.items()}
         match self.kind:
             case "Prescribed":
-                return Prescribed(signals["v"])
+                return Prescribed(signals.pop("v"), signals)
             case "Slider":
                 return Slider(self.numbers["mass"], signals["F_a"])
             case "PulledSlider":
