@@ -32,6 +32,8 @@ from gms_fsm.identification.certainty.assess import (
     sorted_elements,
     unassessed,
 )
+from gms_fsm.identification.certainty.statistics import correlation_time
+from gms_fsm.identification.problem.beginning import ROUNDS, with_states
 from gms_fsm.identification.problem.experiment import MASS, NUISANCE, Point, value_of
 from gms_fsm.identification.problem.linear import linear_names
 from gms_fsm.identification.problem.runs import BEGINS, MOVING, ThreadPool
@@ -42,6 +44,7 @@ from gms_fsm.identification.problem.task import (
     Task,
     bar,
     inside,
+    stretches,
     training_rows,
 )
 from gms_fsm.identification.problem.unknowns import values_by_key
@@ -455,6 +458,8 @@ def fitted(task: Task, *, progress: bool | None = False, intervals: bool = True)
                 raise
         if coarse.point is None:
             raise _nothing_ran(task.coarse.start_point().lost, "no proposal could be run")
+        if not stopped and fine.point is not None:
+            task, fine = _with_states(task, fine, pool)
         point = task.fine.at(coarse.point.u) if fine.point is None else fine.point
         final, point = _settled(task, point)
         if point.lost is not None:
@@ -481,6 +486,23 @@ def fitted(task: Task, *, progress: bool | None = False, intervals: bool = True)
     notes = _notes(task, silent)
     seconds = time.perf_counter() - began
     return Fit(final, point, table, notes, task.ran[0], seconds, stopped)
+
+
+def _with_states(task: Task, best: Best, pool: ThreadPool) -> tuple[Task, Best]:
+    """Return a task with the states in which cut records begin, and its best point."""
+    for _ in range(ROUNDS):
+        assert best.point is not None
+        tau = correlation_time(stretches(task.courses, best.point.residual))
+        other = with_states(task, best.point, tau)
+        if other is task:
+            return task, best
+        found = Best()
+        found.take([other.fine.at(best.point.u)])
+        other.polish(best.point.u, found, pool)
+        if found.point is None or found.point.cost >= best.point.cost:
+            return task, best
+        task, best = other, found
+    return task, best
 
 
 def _assessed(
@@ -532,6 +554,10 @@ def _notes(task: Task, silent: Sequence[str]) -> tuple[str, ...]:
         )
     else:
         notes.append("each record begins with the initial state of the chart")
+    if task.starts:
+        notes.append(
+            f"the states in which {len(task.starts)} stretch(es) begin were found, too"
+        )
     if task.fine.weights:
         notes.append("each record counts alike, however long it is (weight)")
     unread = {name for record in task.records for name in record.inputs} - {*task.bound}

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +35,7 @@ from gms_fsm.identification.certainty.statistics import phase_floor
 from gms_fsm.identification.problem.experiment import Point
 from gms_fsm.identification.problem.runs import BEGINS, MOVING, Course
 from gms_fsm.identification.problem.task import Task, at_all_rows, inside, training_rows
+from gms_fsm.identification.reach import Reach, outside, predicted, reach_of
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
@@ -309,13 +312,25 @@ class Fit:
             found.append(Residuals(record, t, x, v, measured, modelled, train, held))
         return tuple(found)
 
-    def predict(self, record: Record) -> FloatArray:
+    def predict(
+        self,
+        record: Record,
+        initial: Literal["estimate"] | Mapping[str, Any] | None = None,
+        lead: float = 1.0,
+    ) -> FloatArray:
         """Return what the fitted model gives for the motion of a record.
 
         Parameters
         ----------
         record : Record
-            With a position or a velocity; its force is not read.
+            With a position or a velocity, and the inputs that the model reads. Its force is not
+            read but for ``initial="estimate"``.
+        initial : {"estimate"} or mapping, optional
+            The state at the first row: found from the force of the first seconds, with the range of
+            states in training as a prior; or given as in `gms_fsm.simulate`. By default that of the
+            fit: relaxed, or after a run-in.
+        lead : float
+            From how many seconds a state is estimated.
 
         Returns
         -------
@@ -325,20 +340,64 @@ class Fit:
         Raises
         ------
         RecordError
-            If it has no motion.
+            If it has no motion, or no force to estimate a state from.
         SimulationError
             If the run fails.
+
+        Warns
+        -----
+        UserWarning
+            Of what lies outside of the training; see `outside`.
         """
         checked_kind("record", record, Record, "a Record, from Record.from_csv or from_dataframe")
-        return at_all_rows(self.task.fine, self.point, self.task.along(record, None))
+        found = predicted(self, record, initial, checked_scalar("lead", lead, "> 0"))
+        if doubts := self.outside(record):
+            told = "; ".join(doubts)
+            warnings.warn(
+                f"{record.place}: outside of what was trained on: {told}", stacklevel=2
+            )
+        return found
 
-    def score(self, record: Record) -> dict[str, float]:
+    def outside(self, record: Record) -> tuple[str, ...]:
+        """Return what of a record lies outside of what was trained on, in words.
+
+        Parameters
+        ----------
+        record : Record
+            With a position or a velocity.
+
+        Returns
+        -------
+        tuple of str
+            About amplitude, speed at changes of state, force at rest, and the share of time in each
+            state; empty if all of them were met in training.
+        """
+        checked_kind("record", record, Record, "a Record, from Record.from_csv or from_dataframe")
+        unit, found = self.task.measured.unit, dict[str, None]()
+        for course in self.task.along(record, None):
+            own = reach_of(self.task.fine, self.task.subject, course)
+            found |= dict.fromkeys(outside(own, self._reach, unit))
+        return tuple(found)
+
+    @cached_property
+    def _reach(self) -> list[Reach]:
+        fine, subject = self.task.fine, self.task.subject
+        return [reach_of(fine, subject, course) for course in self.task.courses]
+
+    def score(
+        self,
+        record: Record,
+        initial: Literal["estimate"] | Mapping[str, Any] | None = None,
+        lead: float = 1.0,
+    ) -> dict[str, float]:
         """Return how well the fitted model predicts a record.
 
         Parameters
         ----------
         record : Record
             With motion and force.
+        initial, lead
+            As in `predict`; the rows from which a state was estimated do not count.
 
         Returns
         -------
@@ -358,8 +417,12 @@ class Fit:
                 place=record.place,
                 advice=f"give {column}=(name, unit) when reading it",
             )
-        chosen = record.chosen
-        return score_of(record.columns[column][chosen], self.predict(record)[chosen])
+        modelled = self.predict(record, initial, lead)
+        chosen = record.chosen & np.isfinite(modelled)
+        if initial == "estimate":
+            time = record.columns["time"]
+            chosen = chosen & (time > time[0] + lead)
+        return score_of(record.columns[column][chosen], modelled[chosen])
 
     # ------------------------------------------------------------------ how sure it is
     def profile(self, name: str, *, restarts: bool = True, seed: int = 0) -> Profile:
@@ -501,21 +564,45 @@ class Fit:
         Parameters
         ----------
         path : str or Path
-            File name ending in ``.toml``.
+            File name ending in ``.toml``; or in ``.json`` for the fit itself, with its records.
 
         Returns
         -------
         Path
-            The file; ``gms-fsm run`` takes it.
+            The file; ``gms-fsm run`` takes a scenario, `load` a fit.
 
         Raises
         ------
         OutputError
             If it cannot be written.
         """
-        from gms_fsm.identification._saved import save
+        from gms_fsm.identification._saved import save, save_whole
 
-        return save(self, checked_path("path", path))
+        place = checked_path("path", path)
+        return (save_whole if place.suffix == ".json" else save)(self, place)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Fit:
+        """Read a fit that `save` wrote to a file ending in ``.json``.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Fit
+            Evaluated anew; without its choice and profiles.
+
+        Raises
+        ------
+        RecordError
+            If there is no such file, or it is not a fit.
+        """
+        from gms_fsm.identification._saved import loaded
+
+        return loaded(checked_path("path", path))
 
     def report(self, folder: str | os.PathLike[str]) -> Path:
         """Write a report: figures, tables, what the record cannot tell, and the fitted scenario.

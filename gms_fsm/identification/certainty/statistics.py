@@ -19,6 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter
 from scipy.special import stdtrit
 
 from gms_fsm.charts.parameters import FloatArray
@@ -31,6 +33,7 @@ FEWEST_BLOCKS = 12
 LOOSE = 1.5
 # A parameter whose 95 % interval is wider than this (a factor of 3 either way) cannot be told.
 WIDE = math.log(3.0)
+MOST_CORRELATED = 4.0  # atanh of the correlation from row to row: 0.9993
 SHARE = 0.3  # of a direction: what makes a parameter take part in it
 NEGLIGIBLE = 0.02  # of the force: an interval whose whole effect is below this tells "nearly zero"
 
@@ -118,8 +121,12 @@ def certainty(
     if count < FEWEST_BLOCKS + kept.shape[1]:
         middle = np.linalg.pinv(inverse) * variance * tau
     covariance = kept @ inverse @ middle @ inverse @ kept.T
-    # Blocks are few, and fitted residuals are smaller than the noise: never surer than rows / tau.
+    # Blocks are few, and fitted residuals are smaller than the noise: never surer than rows / tau,
+    # nor than noise that decays as the residuals do.
+    decaying, correlation = _of_decaying_noise(slopes @ kept, parts)
+    effective = max(min(effective, rows * (1.0 - correlation) / (1.0 + correlation)), 1.0)
     least = np.einsum("ij,j,ij->i", kept, spread[~loose] ** 2, kept)
+    least = np.maximum(least, np.einsum("ij,jk,ik->i", kept, decaying, kept))
     present = np.maximum(np.diag(covariance), 1e-300)
     wider = np.sqrt(np.maximum(least / present, 1.0))
     covariance = covariance * np.outer(wider, wider)
@@ -131,6 +138,45 @@ def certainty(
     np.fill_diagonal(covariance, np.where(taking, np.inf, np.diag(covariance)))
     half = np.where(taking, np.inf, half)
     return Certainty(covariance, half, opened, vectors, spread, tau, effective)
+
+
+def _of_decaying_noise(
+    slopes: FloatArray, parts: Sequence[FloatArray]
+) -> tuple[FloatArray, float]:
+    """Return the covariance of least squares under AR(1) noise, and its correlation by row.
+
+    The correlation is that of the restricted likelihood of generalised least squares, which knows
+    that a fit has taken a part of the slow noise away; that of the residuals is too small.
+    """
+    ends = np.cumsum([part.size for part in parts])[:-1]
+    columns = np.column_stack([slopes, np.concatenate(list(parts))])
+    pieces = np.split(columns, ends)
+    rows, p = slopes.shape
+    if not p or rows <= p + 2 or not columns[:, -1].any():
+        return np.zeros((p, p)), 0.0
+
+    def whitened(rho: float) -> FloatArray:
+        root = math.sqrt(1.0 - rho * rho)
+        return np.concatenate([np.vstack([root * a[:1], a[1:] - rho * a[:-1]]) for a in pieces])
+
+    def lack(rho: float) -> tuple[float, float]:
+        triangle = np.abs(np.diag(np.linalg.qr(whitened(rho), mode="r")))
+        left = max(float(triangle[-1]) ** 2, 1e-300)
+        fall = 2.0 * float(np.log(np.maximum(triangle[:-1], 1e-300)).sum())
+        return (rows - p) * math.log(left) - len(parts) * math.log(1.0 - rho * rho) + fall, left
+
+    found = minimize_scalar(
+        lambda x: lack(math.tanh(x))[0], bounds=(0.0, MOST_CORRELATED), method="bounded"
+    )
+    rho = math.tanh(float(found.x))
+    innovation = lack(rho)[1] / (rows - p)
+    middle = np.zeros((p, p))
+    for piece in pieces:
+        own = piece[:, :-1]
+        carried = lfilter([1.0], [1.0, -rho], own, axis=0)
+        middle += own.T @ carried + carried.T @ own - own.T @ own
+    inverse = np.linalg.pinv(slopes.T @ slopes)
+    return inverse @ middle @ inverse * (innovation / (1.0 - rho * rho)), rho
 
 
 def _block_sums(scores: FloatArray, parts: Sequence[FloatArray], length: int) -> FloatArray:

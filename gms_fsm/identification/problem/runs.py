@@ -143,7 +143,7 @@ class Course:
         The initial state; empty for that of the chart.
     known : bool
         Whether the state at the first row is known: the motion begins there, at rest, or a run-in
-        leads to it.
+        leads to it, or it was asked for.
     """
 
     record: Record
@@ -260,7 +260,7 @@ def courses_of(
                 lead,
                 max(FEWEST_STEPS, STEPS_PER_ROW * count) if most_steps is None else most_steps,
                 {name: (u[:last], u) for name, u in given.items()},
-                known=bool(last) or still,
+                known=bool(last) or still or (begin == BEGINS[0] and part.start == 0),
             )
         )
     return found
