@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
 
 import integrators
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.foundation.arguments import checked_path, refusing
+from gms_fsm.gradients.directions import directions_of
+from gms_fsm.gradients.linear import Directions
+from gms_fsm.gradients.sensitivities import Sensitivities
 from gms_fsm.lowering.program import equations
 from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
@@ -51,6 +55,7 @@ def simulate(
     checkpoint_every: float = 60.0,
     monitors: str | Iterable[str | Monitor] = (),
     until: str | None = None,
+    sensitivities: Iterable[str] = (),
     **options: Unpack[RunOptions],
 ) -> Trace:
     """Run a friction model on a rig, or a system: ``simulate(system, t_end)``.
@@ -103,6 +108,10 @@ def simulate(
         it becomes true, located as a switch, and at t_end at the latest. It may read what a text of
         the system may, of a model on a rig also F and, of a single element, its variables. If it
         is true at the start it must first become false.
+    sensitivities : iterable of str
+        Numbers by name, as in a sweep (``"k_1"``, ``"gear.F_s"``), and initial values
+        (``"initial.v"``, ``"initial.z2"``): `Trace.sensitivity` has the derivatives by them. They
+        take a second pass over the run; its rows keep their bits.
     **options
         Fields of `Settings` by name, which override those of `settings`: ``method``, ``step``,
         ``rtol``, ``atol``, ``max_step``, ``max_steps``, ``events``, ``output``, ``t_eval``.
@@ -156,6 +165,9 @@ def simulate(
         raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")
     start = Problem.of(model, on, end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, start.what, start.output).values() if monitors else ()
+    if sensitivities:
+        check_derivable(chosen, until)
+        wanted = directions_of(start.what, start.program, start.y, sensitivities)
     own = {} if machines is None else own_machines(machines, start)
     stop = None if until is None else Until.of(start, until)
     if stop is not None:
@@ -186,7 +198,38 @@ def simulate(
     if keeper is not None:
         keeper.finish()
     trace = seen.trace()
+    if sensitivities:
+        trace = replace(trace, derived=derived(start, wanted))
     return watched(trace, watching) if watching else trace
+
+
+def derived(start: Problem, directions: Directions) -> Sensitivities:
+    """Return the derivatives of a run that has reached its end."""
+    options = start.options
+    if start.output == "end":
+        options = replace(options, times=[start.last])
+    begin = start.t_start, start.y, start.mode, start.last
+    return Sensitivities.of(start.program, options, begin, directions)
+
+
+def check_derivable(chosen: Settings, until: str | None = None) -> None:
+    """Refuse settings whose results have no derivative."""
+    if chosen.events != "located":
+        raise ParameterError(
+            "where switches are not located, results jump with the numbers",
+            place="events",
+            value=chosen.events,
+            advice="leave events out, or sensitivities",
+            key=("sensitivities",),
+        )
+    if until is not None:
+        raise ParameterError(
+            "a run that ends by a condition has no fixed end",
+            place="until",
+            value=until,
+            advice="give t_end, and read sensitivity('transitions', ...) of a supervisor",
+            key=("sensitivities",),
+        )
 
 
 class Run:

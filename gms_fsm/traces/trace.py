@@ -23,6 +23,7 @@ from gms_fsm.foundation.arguments import checked_integer, checked_path, pointing
 from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import require
 from gms_fsm.foundation.text import visible
+from gms_fsm.gradients.sensitivities import Sensitivities
 from gms_fsm.lowering.layout import BankPlaces
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.lowering.scales import Setting
@@ -43,6 +44,7 @@ from gms_fsm.traces.views import (
     dwell_times,
     read_parts,
     sampled,
+    sensitivity_of,
     sigma_at,
     sliding_of,
     write_trace,
@@ -106,6 +108,7 @@ class Trace:
     which: str = field(default="", repr=False)  # the contact, of a system with several
     every: Firings | None = field(default=None, repr=False)  # of all contacts, where one is chosen
     initial: Mapping[str, Any] | None = field(default=None, repr=False)  # as given; not in files
+    derived: Sensitivities | None = field(default=None, repr=False)  # if asked for; not in files
 
     def __repr__(self) -> str:
         return f"<Trace: {visible(self.title)}; {len(self)} rows, {len(self.firings)} transitions>"
@@ -162,6 +165,7 @@ class Trace:
         return self.firings.records
 
     impulses = cached_property(impulses_of)
+    sensitivity = sensitivity_of
 
     # ------------------------------------------------------------------ systems
     @cached_property

@@ -236,6 +236,7 @@ Kind: TypeAlias = Literal[
     "repeat",
     "sliding",
     "impulse",
+    "sensitivity",
     "units",
     "unused",
     "not judged",

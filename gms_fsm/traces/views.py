@@ -96,6 +96,58 @@ def sampled(trace: Trace, times: ArrayLike) -> Trace:
     return replace(trace, rows=rows, stops=merged(table, rows), stored={})
 
 
+def sensitivity_of(trace: Trace, of: str, to: str) -> FloatArray:
+    """Return the derivative of a quantity at all rows by a number or an initial value.
+
+    It is exact through every switch, to the tolerances of the run. At the row of a switch it is
+    taken at a fixed time, so it jumps there where the quantity itself bends.
+
+    Parameters
+    ----------
+    of : str
+        What is asked for: ``"F"``, ``"v"``, ``"z"``, ``"x"``; of a system ``"gear.F"``,
+        ``"load.v"``; a further state by its name; or ``"transitions"``, the times of the log.
+    to : str
+        One of the names given as ``sensitivities`` of `gms_fsm.simulate`.
+
+    Returns
+    -------
+    ndarray, shape (rows,), (rows, n) or (transitions,)
+        Per element, if the quantity is; NaN behind a switch that grazes.
+
+    Raises
+    ------
+    ParameterError
+        If the run has no such sensitivities, or the rows are not those of the run.
+
+    Examples
+    --------
+    >>> from gms_fsm import GMS, GMSParameters, PulledSlider, simulate
+    >>> trace = simulate(GMS(GMSParameters.paper("stick-slip"), law="signed"),
+    ...                  PulledSlider(1.0, 2.0, 0.1), 10.0, sensitivities=("F_s", "initial.v"))
+    >>> round(float(trace.sensitivity("transitions", "F_s")[0]), 3)
+    8.104
+    >>> trace.sensitivity("z", "initial.v").shape == trace.z.shape
+    True
+    """
+    if trace.derived is None:
+        raise ParameterError(
+            "the run was made without sensitivities",
+            place="sensitivity",
+            advice=f"simulate(..., sensitivities=({to!r},))",
+        )
+    if of == "transitions":
+        times = trace.derived.times(to)
+        return times if trace.every is None else times[trace.every.within(trace.which)]
+    if not np.array_equal(trace.t, trace.derived.followed.t):
+        raise ParameterError(
+            "the rows are not those of the run",
+            place="sensitivity",
+            advice="ask the trace that simulate returned",
+        )
+    return trace.derived.at_rows(trace.program, trace.rows, of, to, trace.which)
+
+
 def dwell_times(trace: Trace) -> FloatArray:
     """Return the time each element spent in each state.
 

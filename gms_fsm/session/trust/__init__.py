@@ -17,7 +17,7 @@ from gms_fsm.session.trust._path import Track
 from gms_fsm.session.trust._switches import switches
 from gms_fsm.session.trust._values import not_finite, outside, sampling
 from gms_fsm.traces.trace import Trace
-from gms_fsm.traces.verdicts import KINDS, Doubt, Trust
+from gms_fsm.traces.verdicts import KINDS, Doubt, Severity, Trust
 
 __all__ = ["trust_of"]
 
@@ -57,8 +57,17 @@ def _findings(trace: Trace, *, at_times: bool) -> Iterator[Doubt]:
     else:
         text = "from the end of a run alone, switches and slides cannot be judged"
         yield Doubt("not judged", "note", text)
+    yield from _derivatives(trace)
     yield from unused(trace)
     for each in trace.what.system.machines:
         one = trace.contact(each.name)
         for find in (not_finite, outside, growth, *((meant,) if each.chart.velocities else ())):
             yield from find(one)
+
+
+def _derivatives(trace: Trace) -> Iterator[Doubt]:
+    """Yield the switches where derivatives are one-sided, or end."""
+    for each in () if trace.derived is None else trace.derived.followed.doubts:
+        text = f"derivatives at t = {each.t:.9g} s, where {each.place} changes: {each.reason}"
+        severity: Severity = "warning" if each.kind == "grazing" else "note"
+        yield Doubt("sensitivity", severity, text, (each.t,))

@@ -1,0 +1,65 @@
+"""Which numbers and initial values a run is differentiated by, by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import unknown
+from gms_fsm.gradients.linear import Directions
+from gms_fsm.lowering.program import Program
+from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.numbers import column_name, label_in, number_of
+
+INITIAL = "initial."
+
+
+def directions_of(
+    what: Mounted, program: Program, y: list[float], names: Iterable[str]
+) -> Directions:
+    """Return directions by the names of numbers, as in a sweep, and ``initial.v``."""
+    given = (names,) if isinstance(names, str) else tuple(names)
+    if not given:
+        raise ParameterError(
+            "it names nothing", place="sensitivities", advice="give names of numbers"
+        )
+    if len({*given}) < len(given):
+        raise ParameterError("a name stands there twice", place="sensitivities", value=given)
+    shared, own = program.plan.names.shared, program.plan.names.own
+    start = np.zeros((len(y), len(given)))
+    scales = np.ones(len(given))
+    changes: dict[int, np.ndarray] = {}
+    rows: dict[int, np.ndarray] = {}
+    for c, name in enumerate(given):
+        if isinstance(name, str) and name.startswith(INITIAL):
+            places = _initial(program, name)
+            start[places, c] = 1.0
+            scales[c] = max((abs(y[k]) for k in places), default=0.0) or 1.0
+            continue
+        number = number_of(what, name)
+        label = label_in(what, number.whole)
+        scales[c] = abs(number.value) or 1.0
+        if label in shared:
+            row = changes.setdefault(shared.index(label), np.zeros(len(given)))
+            row[c] = 1.0
+            continue
+        k = own.index(label)
+        table = rows.setdefault(k, np.zeros((len(program.p[1][k]), len(given))))
+        table[slice(None) if number.element is None else number.element, c] = 1.0
+    return Directions(given, changes, rows, start, scales)
+
+
+def _initial(program: Program, name: str) -> list[int]:
+    """Return the places of an initial value in the state vector."""
+    layout, plain = program.layout, name.removeprefix(INITIAL)
+    known: dict[str, list[int]] = {}
+    for key, place in layout.keys.items():
+        places = [*layout.y.all_of(place)]
+        known[key] = places
+        if place in layout.y.own:
+            known |= {column_name(key, i): [k] for i, k in enumerate(places)}
+    if plain not in known:
+        raise unknown("initial value", plain, known, place="sensitivities")
+    return known[plain]

@@ -1,0 +1,113 @@
+"""The derivatives of a run, by the names of quantities and of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.foundation.arguments import unknown
+from gms_fsm.gradients.following import Followed, Follower
+from gms_fsm.gradients.linear import Directions, Linear
+from gms_fsm.lowering.layout import SystemLayout
+from gms_fsm.lowering.program import Program
+from integrators import LoopOptions
+
+
+class Table(Protocol):
+    """The rows of a run."""
+
+    @property
+    def t(self) -> FloatArray: ...
+
+    @property
+    def y(self) -> FloatArray: ...
+
+    @property
+    def mode(self) -> NDArray[np.int64]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """The derivatives of a run.
+
+    Parameters
+    ----------
+    directions : Directions
+        By what it was differentiated.
+    followed : Followed
+        The tangents.
+    """
+
+    directions: Directions
+    followed: Followed
+
+    @classmethod
+    def of(
+        cls,
+        program: Program,
+        options: LoopOptions,
+        start: tuple[float, list[float], list[int], float],
+        directions: Directions,
+    ) -> Sensitivities:
+        """Differentiate a run."""
+        return cls(directions, Follower(program, options, start, directions).follow())
+
+    def column(self, to: str) -> int:
+        """Return the place of a direction."""
+        if to not in self.directions.names:
+            raise unknown("sensitivity", to, self.directions.names, place="to")
+        return self.directions.names.index(to)
+
+    def times(self, to: str) -> FloatArray:
+        """Return the derivatives of the times of all firings."""
+        return self.followed.times[:, self.column(to)]
+
+    def at_rows(
+        self, program: Program, rows: Table, of: str, to: str, which: str = ""
+    ) -> FloatArray:
+        """Return the derivatives of a quantity at the rows of the run."""
+        c, layout = self.column(to), program.layout
+        name = _name(layout, of, which)
+        if name in layout.y.shared or name in layout.y.own:
+            made: FloatArray = self.followed.rows[:, layout.y.where(name), c]
+            return made
+        where = layout.observed.where(name)
+        linear, found = Linear(program, self._one(c)), []
+        table = zip(rows.t.tolist(), rows.y.tolist(), rows.mode.tolist(), strict=True)
+        for row, (t, y, mode) in enumerate(table):
+            tangent = self.followed.rows[row, :, c : c + 1]
+            found.append(linear.observe(t, y, mode, tangent)[where, 0])
+        return np.array(found)
+
+    def _one(self, c: int) -> Directions:
+        d, only = self.directions, slice(c, c + 1)
+        return Directions(
+            d.names[only],
+            {k: row[only] for k, row in d.shared.items()},
+            {k: table[:, only] for k, table in d.own.items()},
+            d.y[:, only],
+            d.scales[only],
+        )
+
+
+def _name(layout: SystemLayout, of: str, which: str) -> str:
+    """Return what the layout calls a quantity."""
+    known = dict(layout.keys)
+    observed: Sequence[str] = (*layout.observed.shared, *layout.observed.own)
+    known |= {name: name for name in observed if " " not in name}
+    banks = layout.banks if len(layout.banks) == 1 else ()
+    chosen = [bank for bank in layout.banks if bank.name == which]
+    for bank in (*banks, *chosen):
+        names = {name: name for name in (*layout.y.shared, *layout.y.own, *observed)}
+        known |= {k: u for k, u in bank.plain(names).items() if " " not in k}
+        known.setdefault("x", bank.position)
+        if bank.velocity and bank.velocity not in known:
+            known[bank.velocity] = bank.of(bank.velocity)
+    if not isinstance(of, str) or of not in known:
+        raise unknown("quantity", of, ("transitions", *known), place="of")
+    return known[of]
