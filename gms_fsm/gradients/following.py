@@ -13,6 +13,7 @@ and every tick as they happened, and then brought back to a fixed time with the 
 from __future__ import annotations
 
 import dataclasses
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,17 +21,14 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.gradients.arcs import Arcs
 from gms_fsm.gradients.linear import Directions, Linear
 from gms_fsm.language import comparisons, split
 from gms_fsm.lowering.program import Program, equations
-from integrators import METHODS, Arc, Firing, LoopOptions, Slide, Stop, hybrid
-from integrators.advance import CROSSED, tick_at
+from integrators import Arc, Firing, LoopOptions, Slide, Stop, hybrid
+from integrators.advance import CROSSED
 
 Modes = tuple[int, ...]
-METHOD = METHODS["dp45"]
-ORDER = 5
-SAFE, LEAST, MOST = 0.9, 0.2, 5.0  # of the step control
-SMALLEST = 1e-300
 ALIKE = 1e-7  # times of switches that differ by less have one derivative
 GRAZING = 1e-5  # of the mean rate of a margin over its last step
 
@@ -169,9 +167,8 @@ class Follower:
         self.crossing: _Crossing | None = None
         self.waiting: list[tuple[int, list[float], Modes]] = []  # rows of this instant
         self.taken = 0  # of the requested times
-        self.h = np.inf
         self.arc: tuple[Modes, list[float]] | None = None
-        self.slope: FloatArray | None = None
+        self.arcs = Arcs(self.linear, self.options)
         self.before: tuple[float, list[float]] = t, list(y)
 
     # ------------------------------------------------------------------ the run
@@ -180,8 +177,7 @@ class Follower:
         for event in self.events:
             match event:
                 case Arc(t=times, y=states, mode=mode):
-                    for t, y in zip(times, states, strict=True):
-                        self.row(t, y, mode)
+                    self.rows_of(times, states, mode)
                 case Firing() | Slide():
                     self.hold(event.y, event.mode)
                 case Stop():
@@ -207,20 +203,20 @@ class Follower:
         self.at_instant = True
         self.waiting.append((len(self.switch.done), list(y), mode))
 
-    def row(self, t: float, y: list[float], mode: Modes) -> None:
-        """Go on to a row."""
-        if t <= self.t:
-            self.hold(y, mode)
+    def rows_of(self, times: list[float], states: list[list[float]], mode: Modes) -> None:
+        """Go on along rows of one arc; those at its very start belong to the instant before."""
+        first = 0
+        while first < len(times) and times[first] <= self.t:
+            self.hold(states[first], mode)
+            first += 1
+        if first == len(times):
             return
         if self.at_instant:
             self.mode = mode
             held = list(self.buffers.now.held)
             self.settle(held)
-            self.arc, self.slope, self.h = (mode, held), None, np.inf
-        self.before = self.t, self.y
-        self.integrate(t, y)
-        if self.wanted is None:
-            self.keep(t, self.S)
+            self.arc = mode, held
+        self.integrate(times[first:], states[first:])
 
     def keep(self, t: float, S: FloatArray) -> None:
         """Keep a row."""
@@ -231,7 +227,7 @@ class Follower:
         """Note the end of an arc, or either side of a jump."""
         b = self.buffers
         if event.t > self.t:  # an arc without a row of its end
-            self.row(event.t, event.y, event.mode)
+            self.rows_of([event.t], [event.y], event.mode)
         if not self.at_instant and self.arc is not None:
             self.switch.done.clear()
             if b.memory.status == CROSSED and event.t >= b.now.t:
@@ -246,69 +242,28 @@ class Follower:
             self.t = event.t
 
     # ------------------------------------------------------------------ arcs
-    def integrate(self, t: float, y: list[float]) -> None:
-        """Integrate the tangents to the next row."""
-        wanted, knots = self.wanted or [], self.program.knots
-        stops = [u for u in knots if self.t < u < t]
-        while self.taken < len(wanted) and wanted[self.taken] < t:
-            u = wanted[self.taken]
-            self.taken += 1
-            if u <= self.t:
-                self.keep(u, self.S)
-                continue
-            for stop in [*(s for s in stops if self.t < s < u), u]:
-                self._to(stop)
-            self.keep(u, self.S)
-        for stop in [*(s for s in stops if self.t < s), t]:
-            self._to(stop)
-        self.y = list(y)
-        self.size = np.maximum(self.size, np.abs(np.array(y)))
-
-    def _to(self, t_end: float) -> None:
-        """Integrate state and tangents together, with steps of their own if need be."""
+    def integrate(self, times: list[float], states: list[list[float]]) -> None:
+        """Integrate the tangents along rows of an arc, and keep what is wanted."""
         assert self.arc is not None
-        mode, held = self.arc
-        zero = np.zeros(self.directions.count)
-        linear, options = self.linear, self.options
-
-        def rate(t: float, z: FloatArray) -> FloatArray:
-            f, slope = linear.flow(t, z[:, 0].tolist(), mode, held, zero, z[:, 1:])
-            return np.column_stack([f, slope])
-
-        A, B, C, E = METHOD.A, METHOD.B, METHOD.C, METHOD.E
-        t, z = self.t, np.column_stack([self.y, self.S])
-        k0 = rate(t, z) if self.slope is None else self.slope
-        tick = tick_at(max(abs(t), abs(t_end)))
-        floor = np.maximum(np.array(options.atol), SMALLEST)
-        sizes = np.maximum(self.size, SMALLEST)[:, None] / self.directions.scales
-        while t < t_end:
-            h = min(self.h, t_end - t)
-            if t_end - t - h <= tick:
-                h = t_end - t
-            k = [k0]
-            for i in range(1, len(B)):
-                inner = z + h * sum(a * u for a, u in zip(A[i], k, strict=True) if a)
-                k.append(rate(min(t + C[i] * h, t_end), inner))
-            new = z + h * sum(b * u for b, u in zip(B, k, strict=True) if b)
-            k.append(rate(t + h, new))
-            error = h * np.abs(sum(e * u for e, u in zip(E, k, strict=True) if e))
-            size = np.maximum(np.abs(z), np.abs(new))
-            wide = np.max(size[:, 1:], axis=0, initial=0.0)
-            scale = np.column_stack(
-                [
-                    options.rtol * np.maximum(size[:, 0], self.size) + floor,
-                    options.rtol * (size[:, 1:] + 1e-3 * sizes) + 1e-16 * wide,
-                ]
-            )
-            ratios = (error / scale)[:, np.isfinite(new).all(axis=0)]  # not of what has grazed
-            worst = float(np.max(ratios, initial=0.0))
-            if worst <= 1.0 or h <= 4 * tick:
-                z, k0, t = new, k[-1], t + h
-            factor = SAFE * max(worst, 1e-10) ** (-1 / ORDER)
-            self.h = h * min(max(factor, LEAST), MOST)
-            if worst <= 1.0 and h >= t_end - self.t - tick:
-                self.h = np.inf  # the run's own step is short enough
-        self.t, self.y, self.S, self.slope = t_end, z[:, 0].tolist(), z[:, 1:], k0
+        wanted, end = self.wanted, times[-1]
+        nodes: dict[float, list[float] | None] = {self.t: self.y}
+        kept = times if wanted is None else []
+        if wanted is not None:
+            while self.taken < len(wanted) and wanted[self.taken] < end:
+                kept.append(wanted[self.taken])
+                self.taken += 1
+        knots = self.program.knots
+        between = knots[bisect_right(knots, self.t) : bisect_left(knots, end)]
+        nodes |= dict.fromkeys([*kept, *between])
+        nodes |= zip(times, states, strict=True)
+        t = sorted(nodes)
+        self.size = np.maximum(self.size, np.abs(np.array([self.y, *states])).max(axis=0))
+        table = self.arcs.integrate(*self.arc, t, [nodes[u] for u in t], self.S, self.size)
+        places = {u: place for place, u in enumerate(t)}
+        for u in kept:
+            self.keep(u, table[places[u]])
+        self.before = ([self.t, *times][-2], [self.y, *states][-2])
+        self.t, self.y, self.S = end, list(states[-1]), table[-1].copy()
 
     # ------------------------------------------------------------------ switches
     def settle(self, held: list[float] | None) -> None:

@@ -71,21 +71,20 @@ class Linear:
 
     @cached_property
     def numbers(self) -> list[Any]:
-        """Tangents of the numbers: for all directions, and for each; the last one is the time's."""
+        """Tangents of the numbers for each direction; the last one is the time's."""
+        count = self.directions.count
+        ones = [self._chosen(lambda row, c=c: float(row[c])) for c in range(count)]  # type: ignore[misc]
+        return [*ones, self._chosen(lambda _: 0.0)]
+
+    def _chosen(self, take: Callable[[FloatArray], Any]) -> tuple[list[Any], list[Any]]:
+        """Return a part of the changes of each number: shared ones, and those per element."""
         d, p = self.directions, self.program.p
-
-        def chosen(take: Callable[[FloatArray], Any]) -> tuple[list[Any], list[Any]]:
-            shared = [take(d.shared[k]) if k in d.shared else 0.0 for k in range(len(p[0]))]
-            own = [
-                [take(row) for row in d.own[k]] if k in d.own else [0.0] * len(p[1][k])
-                for k in range(len(p[1]))
-            ]
-            return shared, own
-
-        ones: list[Any] = [chosen(lambda row, c=c: float(row[c])) for c in range(d.count)]  # type: ignore[misc]
-        zero = chosen(lambda _: 0.0)
-        every = chosen(lambda row: np.append(row, 0.0))
-        return [every, *ones, zero]
+        shared = [take(d.shared[k]) if k in d.shared else 0.0 for k in range(len(p[0]))]
+        own = [
+            [take(row) for row in d.own[k]] if k in d.own else [0.0] * len(p[1][k])
+            for k in range(len(p[1]))
+        ]
+        return shared, own
 
     def call(
         self,
@@ -94,23 +93,22 @@ class Linear:
         t_t: FloatArray,
         y_t: FloatArray,
         size: int = 0,
+        p_t: list[Any] | None = None,
     ) -> tuple[list[float], FloatArray]:
         """Call a function; return what it fills, or y without a size, and the tangents of that.
 
         ``t_t`` has shape (columns,), ``y_t`` (m, columns); the last of the directions + 1 columns
-        is the time's, and may be missing.
+        is the time's, and may be missing. The tangents of the numbers may be given for each.
         """
         function, count = self.functions[name], t_t.size
         filled: list[float] = [0.0] * size
         if count == 0:
             self.program.ieee[name](*arguments, *([filled] if size else []))
             return filled, np.zeros((size or y_t.shape[0], 0))
-        if count > FEW:
+        if count > FEW and p_t is None:
             slopes: list[Any] = [0.0] * size
             tangent = list(y_t)
-            every = self.numbers[0]
-            if count == self.directions.count:
-                every = self._without_time
+            every = self._arrays[count]
             more = [filled] if size else []
             time: Any = t_t if t_t.any() else 0.0
             function(*arguments, *more, time, tangent, every, *([slopes] if size else []))
@@ -120,11 +118,11 @@ class Linear:
                 place[:] = row
             return filled, made
         made = np.empty((size or y_t.shape[0], count))
-        columns, given = y_t.T.tolist(), arguments
+        columns, given, numbers = y_t.T.tolist(), arguments, p_t or self.numbers
         for c in range(count):
             column = columns[c]
             slope = [0.0] * size
-            number = self.numbers[1 + c]
+            number = numbers[c]
             if size:
                 function(*given, filled, t_t[c], column, number, slope)
                 made[:, c] = slope
@@ -137,12 +135,11 @@ class Linear:
         return filled, made
 
     @cached_property
-    def _without_time(self) -> Any:
-        shared, own = self.numbers[0]
-        return (
-            [u if isinstance(u, float) else u[:-1] for u in shared],
-            [[u if isinstance(u, float) else u[:-1] for u in row] for row in own],
-        )
+    def _arrays(self) -> dict[int, Any]:
+        """The tangents of the numbers as arrays, by their number of columns."""
+        shared, own = self._chosen(lambda row: row)
+        longer = self._chosen(lambda row: np.append(row, 0.0))
+        return {self.directions.count: (shared, own), self.directions.count + 1: longer}
 
     # ------------------------------------------------------------------ flow
     def flow(
@@ -153,7 +150,7 @@ class Linear:
         if not any(flags):
             plain, slope = self._plain(t, y, list(mode), held, t_t, y_t)
             return np.array(plain), slope
-        f, slope, _, _ = self._sliding(t, y, mode, held, t_t, y_t)
+        f, slope, _, _ = self.along(t, y, mode, held, t_t, y_t)
         return f, slope
 
     def _plain(
@@ -164,11 +161,12 @@ class Linear:
         held: list[float],
         t_t: FloatArray,
         y_t: Any,
+        p_t: list[Any] | None = None,
     ) -> tuple[list[float], FloatArray]:
         arguments = (t, y, mode, held, self.program.p)
-        return self.call("flow", arguments, t_t, y_t, len(y))
+        return self.call("flow", arguments, t_t, y_t, len(y), p_t)
 
-    def _sliding(
+    def along(
         self, t: float, y: list[float], mode: Modes, held: list[float], t_t: FloatArray, y_t: Any
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the slope along surfaces, as `integrators.sliding` has it, and the sigmas."""
@@ -181,14 +179,14 @@ class Linear:
         f = np.zeros(size)
         slope = np.zeros((size, t_t.size))
         if len(which) > 1:
-            one, slopes = self._plain(t, y, modes, signs, t_t, y_t)
+            one, slopes = self._plain(t, y, modes, signs, t_t, y_t, p_t)
             f, slope = (1.0 - len(which)) * np.array(one), (1.0 - len(which)) * slopes
         halves, half_slopes, normals, normal_slopes = [], [], [], []
         for k in which:
             sides = []
             for side in (1.0, -1.0):
                 kept = go_to(surfaces, k, side, signs, modes)
-                sides.append(self._plain(t, y, modes, signs, t_t, y_t))
+                sides.append(self._plain(t, y, modes, signs, t_t, y_t, p_t))
                 go_back(surfaces, k, kept, signs, modes)
             (up, up_t), (low, low_t) = sides
             f += 0.5 * (np.array(up) + low)
@@ -196,7 +194,7 @@ class Linear:
             halves.append(0.5 * (np.array(up) - low))
             half_slopes.append(0.5 * (up_t - low_t))
             arguments = (k, t, y, modes, program.p)
-            g, g_t = self.call("normal", arguments, t_t, y_t, size + 1)
+            g, g_t = self.call("normal", arguments, t_t, y_t, size + 1, p_t)
             normals.append(np.array(g))
             normal_slopes.append(g_t)
         H, dH = np.array(halves), np.array(half_slopes)
@@ -240,7 +238,7 @@ class Linear:
         if any(watch):
             values, slopes = self.call("margins", arguments, t_t, y_t, own)
         if max(relations) >= own:
-            _, _, sigma, d_sigma = self._sliding(t, y, mode, held, t_t, y_t)
+            _, _, sigma, d_sigma = self.along(t, y, mode, held, t_t, y_t)
         g, g_t = [], []
         for r in relations:
             if r < own:
@@ -263,7 +261,7 @@ class Linear:
             arguments = (t, y, modes, program.live, program.p)
             return self.call("observe", arguments, t_t, y_t, size)[1]
         surfaces, held = program.surfaces, self.armed(t, y, mode)
-        _, _, sigma, d_sigma = self._sliding(t, y, mode, held, t_t, y_t)
+        _, _, sigma, d_sigma = self.along(t, y, mode, held, t_t, y_t)
         which, signs = np.flatnonzero(flags).tolist(), list(program.live)
         for k in which:
             if surfaces.machine[k] < 0:

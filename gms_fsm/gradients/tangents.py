@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import ast
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,7 @@ from gms_fsm.language.tree import Number, Value
 from gms_fsm.lowering.generated import SIGNALS, load
 from gms_fsm.lowering.program import Program
 
-MARK = "\u03b4"  # before the name of a value: its tangent; no name of a text begins like this
+MARK = "d__"  # before the name of a value: its tangent
 FUNCTIONS = ("flow", "observe", "margins", "normal", "act", "tick", "follow")
 VECTORS = ("y", "dy", "out")  # arrays that have tangents
 ZERO = "0.0"
@@ -43,8 +43,8 @@ class Places:
     own: frozenset[int]
 
 
-def tangents(program: Program, active: Places) -> Mapping[str, Callable[..., Any]]:
-    """Return the functions of a program with tangents.
+def tangents(program: Program, active: Places) -> Mapping[str, Any]:
+    """Return the functions of a program with tangents, and ``"text"``, their text.
 
     Each takes its own arguments, and then the tangents of t, y, the numbers (shared, own), and of
     what it fills: ``flow(t, y, mode, held, p, dy, dt, y_t, p_t, dy_t)``.
@@ -74,9 +74,10 @@ def tangents(program: Program, active: Places) -> Mapping[str, Callable[..., Any
 @functools.lru_cache(maxsize=64)
 def _made(
     _: ByIdentity[Any], source: str, title: str, active: Places
-) -> Mapping[str, Callable[..., Any]]:
-    namespace = load(title, with_tangents(source, active), SIGNALS)
-    return {name: namespace[name] for name in FUNCTIONS}
+) -> Mapping[str, Any]:
+    text = with_tangents(source, active)
+    namespace = load(title, text, SIGNALS)
+    return {name: namespace[name] for name in FUNCTIONS} | {"text": text}
 
 
 def with_tangents(source: str, active: Places, names: Iterable[str] = FUNCTIONS) -> str:

@@ -203,6 +203,14 @@ def simulate(
     return watched(trace, watching) if watching else trace
 
 
+def simulated(start: Problem) -> Trace:
+    """Run a problem as it stands."""
+    run = CompiledRun(start, None) if start.chosen.engine == "compiled" else Run(start)
+    while run.advance():
+        pass
+    return run.recorder.trace()
+
+
 def derived(start: Problem, directions: Directions) -> Sensitivities:
     """Return the derivatives of a run that has reached its end."""
     options = start.options

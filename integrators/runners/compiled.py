@@ -40,7 +40,7 @@ from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.tree import Local
-from integrators.runners import columns, observing, repeating, stepping
+from integrators.runners import columns, observing, repeating, stepping, varying
 from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
 from integrators.runners.stepping import Sample
 from integrators.sliding import Functions, Held, Sliding
@@ -62,12 +62,13 @@ __all__ = [
     "is_known",
     "observer",
     "stepper",
+    "varier",
 ]
 
 # What is translated: the loop, and what it calls.
 LOOPS = (
     elementary, whole_numbers, steps, step_size, crossings, advance, sliding, sliding_bounds, jolts,
-    loop, columns, stepping, observing, repeating,
+    loop, columns, stepping, observing, repeating, varying,
 )  # fmt: skip
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8
@@ -583,3 +584,11 @@ def observer(
     )
     entry = EntryPoint("entry", observing.observe_rows, extra=("start", "count"))
     return _made(text, rows, [entry], calls, store, notify), rows
+
+
+def varier(
+    text: str, arguments: varying.VaryArguments, store: CodeStore | None, notify: Callable[..., Any]
+) -> CompiledFunction:
+    """Return `integrators.runners.varying.vary` as machine code, as `engine` does."""
+    entry = EntryPoint("entry", varying.vary, extra=("directions", "count"))
+    return _made(text, arguments, [entry], (), store, notify)

@@ -1,0 +1,1 @@
+"""What follows from the derivatives of runs: limit cycles."""
