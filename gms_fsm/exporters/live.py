@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -31,7 +32,8 @@ from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.javascript import javascript_text, tables_of
 from integrators.machine_code.layout import OuterArray
-from integrators.machine_code.tree import Local
+from integrators.machine_code.placed import placed
+from integrators.machine_code.tree import Const, Local
 from integrators.runners.compiled import INLINE, RecordArguments
 from integrators.runners.observing import value_rows
 
@@ -114,8 +116,9 @@ class _LiveModule(RunModule):
         """Return an object of JavaScript."""
         translator = Translator(INLINE)
         self.entries(translator)
-        code = compact(javascript_text(translator.module), ENTRIES)
         _, tables = tables_of(translator.module)
+        module = placed(translator.module, {"block": Const("p", 8 * len(tables))})
+        code = compact(javascript_text(module), ENTRIES)
         image, true = self.image()
         place, layout = self.layout.offset, self.start.program.layout
         known = {
@@ -178,4 +181,6 @@ def _stored(column: dict[str, Any]) -> dict[str, Any]:
 
 
 def _base64(values: Any) -> str:
-    return base64.b64encode(np.asarray(values, dtype="<f8").tobytes()).decode()
+    """Return floats as base64, in which a long run of A, zero bytes, is its length: ``-12-``."""
+    text = base64.b64encode(np.asarray(values, dtype="<f8").tobytes()).decode()
+    return re.sub("A{5,}", lambda found: f"-{len(found[0])}-", text)

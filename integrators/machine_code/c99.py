@@ -345,7 +345,7 @@ class CWriter:
                 lines = [f"{space}if ({self.value(test)}) {{", *self.block(body, depth + 1)]
                 if len(orelse) == 1 and isinstance(orelse[0], If):
                     first, *rest = self.statement(orelse[0], depth)
-                    return [*lines, f"{space}}} else {first.strip()}", *rest]
+                    return [*lines, f"{space}}} else {first.lstrip()}", *rest]
                 if orelse:
                     lines += [f"{space}}} else {{", *self.block(orelse, depth + 1)]
                 return [*lines, f"{space}}}"]

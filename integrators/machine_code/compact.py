@@ -14,6 +14,7 @@ _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*")
 _FUNCTION = re.compile(r"(?m)^function (\w+)")
 _PART = re.compile(r"(?<![\w.])0(\.\d)")
+_POWER = re.compile(r"(?<=\de)-0(?=\d)")
 _WHOLE = re.compile(r"(?<![\w.])(\d+)\.0(?!\w)")
 
 
@@ -25,7 +26,7 @@ def compact(text: str, kept: Collection[str]) -> str:
     >>> compact("function twice(u_0) {\n    return 2.0 * u_0; /* doubled */\n}", ["twice"])
     'function twice(a){return 2*a;}'
     """
-    bare = _COMMENT.sub("", text).strip()
+    bare = _short(_COMMENT.sub("", text).strip().splitlines())
     fixed = {*RESERVED.split(), *HELPERS, *kept, "Float64Array", "BigInt64Array"}
     own = [each for each in _FUNCTION.findall(bare) if each not in fixed]
     counts = Counter(each for each in _NAME.findall(bare) if each in {*own})
@@ -40,7 +41,27 @@ def compact(text: str, kept: Collection[str]) -> str:
         return " " * (words or (before == after and before in "+-"))
 
     packed = re.sub(r"\s+", blank, renamed)
-    return _PART.sub(r"\1", _WHOLE.sub(r"\1", packed))
+    return _PART.sub(r"\1", _WHOLE.sub(r"\1", _POWER.sub("-", packed)))
+
+
+def _short(lines: list[str]) -> str:
+    """Return lines in which a single statement has no braces, and declarations are joined."""
+    made: list[str] = []
+    for line in lines:
+        space, word, rest = re.match(r"(\s*)(let )?(.*)", line).groups("")  # type: ignore[union-attr]
+        if word and made and re.match(f"{space}let ", made[-1]):
+            made[-1] = f"{made[-1].removesuffix(';')}, {rest}"
+            continue
+        inner = made[-1].strip() if made else ""
+        if rest.startswith("}") and len(made) > 1 and inner.endswith(";"):
+            opening = made[-2].strip()
+            alone = not re.match(r"(if|for|while|let|const)\b", inner)
+            if alone and re.match(r"(}? ?else|if|for|while)\b.*{$", opening):
+                made[-2:] = [f"{made[-2].removesuffix('{')}{inner}"]
+                line = f"{space}{rest[1:].lstrip()}"
+        if line.strip():
+            made.append(line)
+    return "\n".join(made)
 
 
 def _renamed(function: str, known: Mapping[str, str], fixed: Collection[str]) -> str:

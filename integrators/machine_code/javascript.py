@@ -15,14 +15,17 @@ from collections.abc import Callable, Mapping
 from integrators.machine_code.c99 import CFields, CNames, CWriter, calls
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
+from integrators.machine_code.locals import declarations, without_copies
 from integrators.machine_code.tree import (
     Address,
     AddressOf,
+    Assign,
     AssignMany,
     Callback,
     Choose,
     Const,
     Expr,
+    For,
     Foreign,
     Global,
     Load,
@@ -103,7 +106,7 @@ def javascript_text(module: Module) -> str:
     known = taken | {functions(each.name) for each in module.functions}
     results = {each.name: each.results for each in module.functions}
     text = "\n".join(
-        _Script(each, results, functions, CNames(known), tables).text(static=True)
+        _Script(without_copies(each), results, functions, CNames(known), tables).text(static=True)
         for each in module.functions
     )
     used = [each for name, each in HELPERS.items() if re.search(rf"\b{name}\(", text)]
@@ -131,6 +134,7 @@ class _Script(CWriter):
         tables: Mapping[str, int],
     ) -> None:
         self.tables = tables
+        self.declared = dict[int, frozenset[str]]()
         super().__init__(function, results, functions, locals_, CFields(()))
 
     def text(self, *, static: bool) -> str:
@@ -139,10 +143,14 @@ class _Script(CWriter):
         function = self.function
         names = ", ".join(self.name(each.name) for each in function.parameters)
         lines = [f"function {self.functions(function.name)}({names}) {{"]
+        self.declared = {
+            at: names - self.unread for at, names in declarations(function.body).items()
+        }
+        later = {name for names in self.declared.values() for name in names}
         own = [
             f"{self.name(each.name)} = {_ZEROS[each.kind]}"
             for each in function.variables
-            if each.name not in self.unread
+            if each.name not in self.unread | later
         ]
         if own:
             lines.append(f"    let {', '.join(own)};")
@@ -154,12 +162,18 @@ class _Script(CWriter):
     # ------------------------------------------------------------------ statements
     def statement(self, statement: Statement, depth: int) -> list[str]:
         """Write a statement."""
-        space = "    " * depth
+        space, declared = "    " * depth, self.declared.get(id(statement), frozenset())
         match statement:
+            case Assign(target=target) | For(target=target) if target.name in declared:
+                first, *more = super().statement(statement, depth)
+                begin = "for (" if isinstance(statement, For) else space
+                return [first.replace(begin, f"{begin}let ", 1), *more]
             case AssignMany(targets=targets, call=call):
                 kinds = self.results[call.name]
+                let = ["let " if each.name in declared else "" for each in targets]
                 return [f"{space}{self.value(call)};"] + [
-                    f"{space}{self.name(each.name)} = F[{k}]{' !== 0' if kinds[k] == 'b' else ''};"
+                    f"{space}{let[k]}{self.name(each.name)} = F[{k}]"
+                    f"{' !== 0' if kinds[k] == 'b' else ''};"
                     for k, each in enumerate(targets)
                     if each.name not in self.unread
                 ]
@@ -187,6 +201,8 @@ class _Script(CWriter):
                 return text, _UNARY if text.startswith("-") else _WHOLE
             case Global(name=name):
                 return str(self.tables[name]), _WHOLE
+            case Const(kind="p", value=value):
+                return str(value // 8), _WHOLE
             case Load(kind="b", address=address):
                 return f"{self.place('b', address)} !== 0", 5
             case Callback():
@@ -227,13 +243,26 @@ class _Script(CWriter):
         if address.offset % 8:
             raise ValueError(f"JavaScript has no address within a word: {address}")
         base, offset = address.base, address.offset // 8
-        parts = [] if isinstance(base, Global) else [self.value(base, 8)]
-        if isinstance(base, Global):
-            offset += self.tables[base.name]
-        if isinstance(address.index, Const) and address.size == 8:
-            offset += address.index.value
-        elif address.index is not None:
-            parts.append(self.value(address.index, 9))
+        parts: list[str] = []
+        match base:
+            case Global(name=name):
+                offset += self.tables[name]
+            case Const(value=value):
+                offset += value // 8
+            case _:
+                parts.append(self.value(base, 8))
+        index = address.index
+        while address.size == 8 and index is not None:
+            match index:
+                case Const(value=more):
+                    index = None
+                case Op(op="+", operands=(Const(value=more), index) | (index, Const(value=more))):
+                    pass
+                case _:
+                    break
+            offset += more
+        if index is not None:
+            parts.append(self.value(index, 9))
         if offset or not parts:
             parts.append(f"{offset} /* {address.name} */" if address.name else str(offset))
         return " + ".join(parts)
@@ -244,7 +273,8 @@ class _Script(CWriter):
             return f"F[{self.words(address)}]"
         first = self.words(Address(address.base, address.offset))
         index = "" if address.index is None else f" + {self.value(address.index, 9)}"
-        return f"B[({first}) * 8{index}]"
+        bytes_ = str(8 * int(first)) if first.isdigit() else f"({first}) * 8"
+        return f"B[{bytes_}{index}]"
 
     def address_of(self, expr: AddressOf) -> tuple[str, int]:
         """Write an address."""

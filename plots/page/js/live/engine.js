@@ -7,7 +7,7 @@ const GROWING = { // columns by what there is one entry of
 };
 
 function floats(text = "") {
-  const letters = atob(text), bytes = new Uint8Array(letters.length);
+  const letters = atob(text.replace(/-(\d+)-/g, (_, count) => "A".repeat(count))), bytes = new Uint8Array(letters.length);
   for (let k = 0; k < letters.length; k++) bytes[k] = letters.charCodeAt(k);
   return new Float64Array(bytes.buffer);
 }
@@ -54,7 +54,7 @@ class Engine {
     const { codes } = this.known, until = performance.now() + most;
     let event = this.begin(numbers);
     while (event === codes.ROWS) {
-      event = this.functions.record(this.block, STEPS_AT_ONCE, 0);
+      event = this.functions.record(STEPS_AT_ONCE, 0);
       if (event !== codes.ROWS) break;
       if (performance.now() > until) return null;
       const { rows, firings } = this.isFull;
@@ -70,14 +70,14 @@ class Engine {
   begin(numbers) {
     this.F.set(this.first);
     for (const [word, value] of numbers) this.F[this.block + word] = value;
-    this.F[this.block + this.known.places.time_scale] = this.functions.adapt(this.block);
+    this.F[this.block + this.known.places.time_scale] = this.functions.adapt();
     return this.known.codes.ROWS;
   }
 
   found(event) {
     const { known: { codes, sizes, failures, elements }, F, places } = this, count = this.word("row"), fired = this.word("firings");
-    this.functions.show(this.block, 0, count);
-    this.functions.values(this.block, count);
+    this.functions.show(0, count);
+    this.functions.values(count);
     const part = (name, length) => F.subarray(places[name], places[name] + length);
     const stopped = event === codes.DONE ? "" : `t = ${this.word("clock")} s: ${event === codes.LIVELOCK ? `${elements[this.word("machine")]}: ` : ""}${failures[event] ?? "it stopped"}`;
     return {
