@@ -198,11 +198,12 @@ class PlainC:
             "",
             f"void {self.name}_start({self.name} *{self.me});",
             "",
-            f"/* One step with a constant velocity: the force at its beginning [{self.element.force}]. */",
+            "/* One step with a constant velocity:",
+            f" * the force at its beginning [{self.element.force}]. */",
             f"{self.signature()};",
             "",
-            "/* One sample, in which the velocity goes from v0 to v1 on a straight line: the force at",
-            f" * its end [{self.element.force}]. A change of direction is found; it takes four steps at most. Its limits:",
+            "/* One sample, in which the velocity goes from v0 to v1 on a straight line: the force",
+            f" * at its end [{self.element.force}]. A change of direction is found; it takes four steps at most. Limits:",
             *(f" * - {FORMS.clean(each)};" for each in limits_of(element)[:-1]),
             f" * - {FORMS.clean(limits_of(element)[-1])}. */",
             f"{self.sample_signature()};",
@@ -288,9 +289,8 @@ class PlainC:
         reads = [name for name, _ in self.element.inputs[1:]]
 
         def step(v: str, passed: str, length: str) -> str:
-            given = "".join(
-                f", {name} + {passed}" if name == "t" and passed else f", {name}" for name in reads
-            )
+            now = {"t": f"t + {passed}"} if passed else {}
+            given = "".join(f", {now.get(name, name)}" for name in reads)
             return f"{self.name}_step({self.me}, {v}{given}, {length});"
 
         lines = [

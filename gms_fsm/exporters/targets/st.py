@@ -203,22 +203,18 @@ class StructuredText:
     def sample(self) -> Iterator[str]:
         """Return the block of a sample in which the velocity goes on a straight line."""
         element, cycle = self.element, self.form.dt
-        v0, v1, step, before, begin = map(element.free, ("v0", "v1", "step", "before", "begin"))
+        v0, v1, step, before, begin = map(element.free, ("v0", "v1", "friction", "before", "begin"))
         (v, _), *others = element.inputs
         velocities = [(v0, "m/s: velocity at the last call"), (v1, "m/s: velocity now")]
         inputs = [*velocities, *others, (cycle, "s: since the last call")]
 
         def call(velocity: str, passed: str, length: str) -> str:
-            given = "".join(
-                f", {each} := {each} + {passed}"
-                if each == "t" and passed
-                else f", {each} := {each}"
-                for each, _ in others
-            )
+            now = {"t": f"t + {passed}"} if passed else {}
+            given = "".join(f", {each} := {now.get(each, each)}" for each, _ in others)
             return f"{step}({v} := {velocity}{given}, {cycle} := {length});"
 
-        yield "(* One sample, in which the velocity goes from v0 to v1 on a straight line: the force"
-        yield "   at its end. A change of direction is found; it takes four steps at most. Limits:"
+        yield "(* One sample, in which the velocity goes from v0 to v1 on a straight line: the"
+        yield "   force at its end. A change of direction is found; it takes four steps at most. Limits:"
         *first, last = map(FORMS.clean, limits_of(element))
         yield from (f"   - {each};" for each in first)
         yield f"   - {last}. *)"
