@@ -24,6 +24,7 @@ from gms_fsm.exporters.plain.form import (
 )
 from gms_fsm.exporters.plain.parts import Expression, Let, StateParts
 from gms_fsm.exporters.plain.walker import Forms, Walker
+from gms_fsm.exporters.targets._matlab_system import MatlabSystem
 from gms_fsm.formats import Format, register
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
@@ -128,7 +129,7 @@ CALLED = {name: f"@_{name}({{all}})" for name in ("floor", "round", "tooth", "no
 
 
 def matlab(subject: Subject) -> dict[str, str]:
-    """Return a friction as a function file.
+    """Return a friction, or a whole system, as function files.
 
     Examples
     --------
@@ -138,6 +139,9 @@ def matlab(subject: Subject) -> dict[str, str]:
     >>> "elseif z(i) <= -s && v < -p.v_c" in text
     True
     """
+    if not subject.alone:
+        system = MatlabSystem(subject, WORDS, CALLED, DEFINED)
+        return system.files(lambda friction: FunctionFile(friction).text())
     printer = FunctionFile(subject)
     return {
         f"{subject.name}.m": printer.text(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from gms_fsm.exporters._names import check_functions, identifier
 from gms_fsm.exporters._readme import about_friction
@@ -11,6 +11,7 @@ from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.element import NamedFriction
 from gms_fsm.exporters.plain.parts import Constant, Leaving
 from gms_fsm.exporters.plain.walker import indented
+from gms_fsm.exporters.plain.whole import WholeSystem
 from gms_fsm.formats import Format, register
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import (
@@ -19,6 +20,7 @@ from gms_fsm.language import (
     Condition,
     Either,
     Node,
+    Number,
     Requirement,
     Split,
     Value,
@@ -51,8 +53,11 @@ WORDS = frozenset(
 )
 
 
+FLANGES = {"Translational": ("s", "f"), "Rotational": ("phi", "tau")}
+
+
 def modelica(subject: Subject) -> dict[str, str]:
-    """Return a friction as a Modelica model.
+    """Return a friction, or a whole system, as a Modelica model.
 
     Examples
     --------
@@ -62,10 +67,15 @@ def modelica(subject: Subject) -> dict[str, str]:
     >>> "when pre(state) == 1 and z >= s and v > v_c then" in text
     True
     """
+    name = subject.name
+    if not subject.alone:
+        whole = ModelOfSystem(subject)
+        return {f"{name}.mo": whole.text(), f"README-{name}-modelica.md": whole.readme()}
     printer = ModelOfElements(subject)
     return {
-        f"{subject.name}.mo": printer.text(),
-        f"README-{subject.name}-modelica.md": printer.readme(),
+        f"{name}.mo": printer.text(),
+        f"{name}_flanges.mo": printer.flanges(),
+        f"README-{name}-modelica.md": printer.readme(),
     }
 
 
@@ -110,6 +120,26 @@ class ModelOfElements:
         lines += _inside(f"Real {e.name}{_comment(e.about)};" for e in self.shared_lets)
         lines += ["equation", *_inside(self.equations())]
         return "\n".join([*lines, f"end {self.name};"]) + "\n"
+
+    def flanges(self) -> str:
+        """Return the friction between two flanges: translational, and rotational."""
+        (velocity, _), *others = self.element.inputs
+        lines = list[str]()
+        for kind, (s, f) in FLANGES.items():
+            own = f"{self.name}_{kind.lower()}"
+            lines += [f"model {own} {_string(f'{self.element.title}, between two flanges')}"]
+            ends = [f"Modelica.Mechanics.{kind}.Interfaces.Flange_{u} flange_{u};" for u in "ab"]
+            ends += [f"input Real {name}{_comment(about)};" for name, about in others]
+            lines += _inside([*ends, f"Real {s}_rel;", f"{self.name} friction;"])
+            body = [
+                f"{s}_rel = flange_b.{s} - flange_a.{s};",
+                f"friction.{velocity} = der({s}_rel);",
+                *(f"friction.{name} = {name};" for name, _ in others),
+                f"flange_b.{f} = friction.F;",
+                f"flange_a.{f} = -friction.F;",
+            ]
+            lines += ["equation", *_inside(body), f"end {own};", ""]
+        return "\n".join(lines)
 
     def constant(self, constant: Constant) -> str:
         value, number = constant.value, MODELICA.number
@@ -233,6 +263,8 @@ class ModelOfElements:
 # {visible(self.element.title)} as a Modelica model
 
 - {name}.mo: the model `{name}`, and `{self.kind}`, of which it is made; no library is needed
+- {name}_flanges.mo: the same between two flanges of the Modelica Standard Library,
+  `{name}_translational` and `{name}_rotational`
 
 ## How to run it
 
@@ -260,6 +292,89 @@ the text; no other tool has run it.
 {about_friction(self.element)}
 Guards are conditions of when-clauses, so the tool locates the switches; corners and jumps of the
 flow are if-expressions, which it locates too.
+
+## What it does not do
+
+A when-clause sees its condition become true. A guard that is true at the very beginning is taken
+only after it has been false.
+"""
+
+
+class ModelOfSystem:
+    """Prints a system as one model, around those of the frictions of its contacts."""
+
+    def __init__(self, subject: Subject) -> None:
+        self.name = identifier(subject.name, WORDS, f"name {subject.name!r}")
+        self.whole = whole = WholeSystem.of(subject, WORDS)
+        self.frictions = {each.name: ModelOfElements(each.friction) for each in whole.contacts}
+        self.texts = {"t": "time"} | {each.force: f"{each.name}.F" for each in whole.contacts}
+        trees: list[Node] = [tree for row in whole.rates.values() for tree in row]
+        trees += [tree for _, tree in whole.definitions]
+        trees += [tree for rows in whole.updates.values() for tree in rows.values()]
+        check_functions(trees, MODELICA, f"system {subject.title!r}", "Modelica")
+
+    def spell(self, node: Node) -> str:
+        return spell(node, MODELICA, self.texts)
+
+    def text(self) -> str:
+        whole, number = self.whole, MODELICA.number
+        models = [each.text() for each in self.frictions.values()]
+        lines = [f"model {self.name} {_string(whole.subject.title)}"]
+        lines += _inside(f"input Real {name};" for name in whole.inputs)
+        lines += _inside(f"parameter Real {k} = {number(v)};" for k, v in whole.numbers.items())
+        for name, value in whole.start.items():
+            kind = "" if name in whole.rates else "discrete "
+            lines += _inside([f"{kind}Real {name}(start = {number(value)}, fixed = true);"])
+        lines += _inside(f"Real {name};" for name, _ in whole.definitions)
+        lines += _inside(f"{each.name} {contact};" for contact, each in self.frictions.items())
+        lines += ["equation", *_inside(self.equations()), f"end {self.name};", ""]
+        return "\n".join([*models, *lines])
+
+    def equations(self) -> Iterator[str]:
+        whole = self.whole
+        for name, tree in whole.definitions:
+            yield f"{name} = {self.spell(tree)};"
+        for name, (mass, rate) in whole.rates.items():
+            times = "" if mass == Number(1.0) else f"({self.spell(mass)}) * "
+            yield f"{times}der({name}) = {self.spell(rate)};"
+        for each in whole.contacts:
+            for name, tree in each.inputs:
+                yield f"{each.name}.{name} = {self.spell(tree)};"
+        for sampler in whole.samplers:
+            first = whole.subject.t_start + sampler.offset
+            yield f"when sample({first!r}, {sampler.period!r}) then  // {sampler.name}"
+            texts, updates = {**self.texts, "period": repr(sampler.period)}, sampler.updates
+            texts |= {name: f"pre({name})" for name in updates}
+            for name, tree in whole.updates[sampler.name].items():  # they see those before them
+                yield f"  {name} = {spell(tree, MODELICA, texts)};"
+                texts[name] = name
+            yield "end when;"
+
+    def readme(self) -> str:
+        name = self.name
+        models = "".join(
+            f"- `{each.name}` in it: the friction of the contact `{contact}`\n"
+            for contact, each in self.frictions.items()
+        )
+        inputs = ", ".join(f"`{each}`" for each in self.whole.inputs)
+        return f"""\
+# {visible(self.whole.subject.title)} as a Modelica model
+
+- {name}.mo: the model `{name}` of the whole system; no library is needed
+{models}
+{f"Inputs: {inputs}." if inputs else "It has no inputs."} Bodies, springs and numbers are its
+equations and parameters; samplers are when-clauses.
+
+## How to run it
+
+Load {name}.mo into a Modelica tool and simulate `{name}`. Rumoca has run such models:
+
+    import rumoca
+    model = rumoca.Session().loads(open("{name}.mo").read(), model="{name}")
+    config = rumoca.SimConfig(rtol=1e-9, atol=1e-14)
+    result = model.simulate((0.0, 1.0), dt=0.001, config=config)
+
+Deflections are small: in every tool, choose an absolute tolerance far below them.
 
 ## What it does not do
 

@@ -214,7 +214,7 @@ class StructuredText:
             return f"{step}({v} := {velocity}{given}, {cycle} := {length});"
 
         yield "(* One sample, in which the velocity goes from v0 to v1 on a straight line: the"
-        yield "   force at its end. A change of direction is found; it takes four steps at most. Limits:"
+        yield "   force at its end. A change of direction is found, in at most four steps. Limits:"
         *first, last = map(FORMS.clean, limits_of(element))
         yield from (f"   - {each};" for each in first)
         yield f"   - {last}. *)"
