@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from gms_fsm.charts.parameters import Parameter as Parameter
     from gms_fsm.charts.stribeck import Stribeck as Stribeck
     from gms_fsm.coupling.bank import FrictionBank as FrictionBank
+    from gms_fsm.coupling.compensator import Compensator as Compensator
     from gms_fsm.coupling.equations import FrictionEquations as FrictionEquations
     from gms_fsm.coupling.stepping import FrictionState as FrictionState
     from gms_fsm.coupling.system_state import SystemState as SystemState
@@ -123,6 +124,7 @@ _HOMES = {
     "phenomena.measure": "Bench PhenomenaTable measure_phenomena",
     "records.record": "Record",
     "coupling.bank": "FrictionBank",
+    "coupling.compensator": "Compensator",
     "coupling.equations": "FrictionEquations",
     "run.machines": "Element ElementMachines",
     "run.repeated.prepare": "Prepared prepare",

@@ -63,8 +63,8 @@ class Format:
     words : collection of str
         Words of the format's language, which no exported name may be.
     takes : tuple of str
-        Which of ``initial``, ``t_start``, ``settings`` and ``t_end`` it uses; `gms_fsm.export`
-        refuses the others.
+        Which of ``initial``, ``t_start``, ``settings``, ``t_end`` and ``compensator`` it uses;
+        `gms_fsm.export` refuses the others.
 
     Raises
     ------

@@ -34,6 +34,7 @@ from gms_fsm import (
     Body,
     Chart,
     ChartModel,
+    Compensator,
     Contact,
     Coverage,
     Element,
@@ -2251,6 +2252,23 @@ rows = {
         "", ..., lambda: describing_function(SAMPLED_PAD, 1, 1, input="u", output="x")),
 }  # fmt: skip
 group("linear answer", ParameterError, called, rows)
+rows = {
+    "number": ("model_or_contact", 3, lambda: Compensator(3, 1e-3)),
+    "period": ("period", 0.0, lambda: Compensator(GIVEN, 0.0)),
+    "feedback": ("feedback", 1.5, lambda: Compensator(GIVEN, 1e-3, feedback=1.5)),
+    "limit": ("limit", -1.0, lambda: Compensator(GIVEN, 1e-3, limit=-1.0)),
+    "gain": ("gain", "all", lambda: Compensator(GIVEN, 1e-3, gain="all")),
+    "missing velocity": ("measured", ..., lambda: Compensator(GIVEN, 1, feedback=1.0).advance(0.1)),
+    "velocity that is NaN": ("reference", NAN, lambda: Compensator(GIVEN, 1).advance(NAN)),
+    "velocity that is a word": ("reference", "fast", lambda: Compensator(GIVEN, 1).advance("fast")),
+    "measured word": (
+        "measured", "x", lambda: Compensator(GIVEN, 1, feedback=0.5).advance(0.1, "x")),
+    "friction that locks": (
+        "chart 'Coulomb friction with stiction'", ..., lambda: Compensator(placed("stiction"), 1)),
+    "format that cannot": (
+        "system", ..., lambda: export(Compensator(GIVEN, 1), "js", "out", name="pad")),
+}  # fmt: skip
+group("compensator", ParameterError, called, rows)
 locks = ("stiction", "karnopp", "modelica", "dog-clutch", "end-stop")
 rows = {
     "number": ("model_or_contact", 3, lambda: FrictionState(3)),

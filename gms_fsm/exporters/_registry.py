@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.coupling.compensator import Compensator
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
@@ -40,7 +41,7 @@ def formats() -> dict[str, Format]:
 
 @refusing()
 def export(
-    system: System | Model | Contact | Chart,
+    system: System | Model | Contact | Chart | Compensator,
     format: str,  # noqa: A002 (as the command line calls it)
     folder: str | Path,
     *,
@@ -56,10 +57,10 @@ def export(
 
     Parameters
     ----------
-    system : System, Model, Contact or Chart
+    system : System, Model, Contact, Chart or Compensator
         What is handed over. A model or a contact is one friction whose velocity is an input. The
         inputs of a system are those of its signals that are records. A chart alone has no numbers:
-        only formats for charts take it.
+        only formats for charts take it. A compensator is its friction, and as c99 what calls it.
     format : str
         A key of `formats()`.
     folder : str or Path
@@ -126,6 +127,12 @@ def export(
             raise ParameterError(
                 f"format {format!r} does not use it", place=each, advice="leave it out"
             )
+    if subject.compensator is not None and "compensator" not in form.takes:
+        raise ParameterError(
+            f"format {format!r} cannot express a compensator",
+            place="system",
+            advice="export its friction, compensator.model, or choose format 'c99'",
+        )
     files: Mapping[str, str | bytes]
     if form.subject == "chart":
         files = {f"{subject.name}{form.name}": form.write(subject.chart)}

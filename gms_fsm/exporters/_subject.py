@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gms_fsm.charts.chart import Chart
+from gms_fsm.coupling.compensator import Compensator
 from gms_fsm.coupling.steppable import alone, begin, start_of, start_of_system
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import slug
@@ -45,6 +46,8 @@ class Subject:
         Method and tolerances.
     t_end : float or None
         s: the end of a run, for formats that contain one.
+    compensator : Compensator or None
+        What calls the one friction.
     """
 
     name: str
@@ -57,11 +60,12 @@ class Subject:
     t_start: float
     settings: Settings
     t_end: float | None = None
+    compensator: Compensator | None = None
 
     @classmethod
     def of(
         cls,
-        given: System | Model | Contact | Chart,
+        given: System | Model | Contact | Chart | Compensator,
         format: str,  # noqa: A002
         *,
         name: str = "",
@@ -71,7 +75,12 @@ class Subject:
         t_end: float | None = None,
     ) -> Subject:
         """Check what is exported; see `gms_fsm.export`."""
-        whole, friction, chart = _parts(given)
+        compensator, friction_of = (
+            (given, given.model) if isinstance(given, Compensator) else (None, given)
+        )
+        if compensator is not None and initial is None:
+            initial = compensator.initial
+        whole, friction, chart = _parts(friction_of)
         checked_kind("name", name, str, "a text")
         kind, named = ("chart", chart) if whole is None else ("system", whole)
         assert named is not None
@@ -81,7 +90,7 @@ class Subject:
         if initial is not None:
             checked_kind("initial", initial, Mapping, "a mapping")
         begin(t_start)
-        more = (initial, t_start, used, t_end)
+        more = (initial, t_start, used, t_end, compensator)
         return cls(chosen, named.name, format, whole, friction, chart, *more)
 
     @property

@@ -116,8 +116,8 @@ def _driven(what: Any, given: str, output: str) -> System:
                 "a system needs it", place=name, advice='for example input="u", output="x"'
             )
     numbers = dict(what.numbers)
-    if given not in numbers and given not in what.signals:
-        raise unknown("input", given, [*what.signals, *numbers])
+    if given not in numbers and given not in what.given:
+        raise unknown("input", given, [*what.given, *numbers])
     mean = numbers.pop(given, 0.0)
     system: System = replace(
         what,

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.coupling.compensator import Compensator
 from gms_fsm.errors import ParameterError
-from gms_fsm.exporters._c import TAKES, WORDS, CEngine, engine_of, filled
+from gms_fsm.exporters._c import TAKES, WORDS, CEngine, engine_of, filled, safe
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import plain_c, plain_c_notes
@@ -17,6 +18,7 @@ from gms_fsm.formats import Format, register
 from gms_fsm.foundation.text import visible
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.systems.signals import Corners
+from integrators.machine_code.c99 import number_text
 
 PERIOD, PERIODS, ROWS = 10.0, 2, 2000  # s; of the record that a single friction is given
 FAR, FAST = 3.0, 100.0  # its amplitude, in deflections; or its speed, in those of the guards
@@ -28,8 +30,10 @@ def c99(subject: Subject) -> dict[str, str]:
     made = engine_of(subject)
     name = made.name
     plain, notes = _plain(subject)
+    calling = {} if subject.compensator is None else _compensator(subject.compensator, made)
     return {
         **plain,
+        **calling,
         f"{name}.h": made.header,
         f"{name}.c": made.source,
         f"{name}_main.c": _main(made),
@@ -48,6 +52,35 @@ def _plain(subject: Subject) -> tuple[dict[str, str], str]:
         return plain_c(subject), f"## The plain form\n\n{plain_c_notes(subject)}"
     except ParameterError as error:
         return {}, f"There is no plain form: {error}\n"
+
+
+def _compensator(given: Compensator, made: CEngine) -> dict[str, str]:
+    """Return a header whose function a controller calls once a tick."""
+    velocity, measured = "reference", given.feedback > 0.0
+    if measured:
+        velocity += f" + {number_text(given.feedback)} * (measured - reference)"
+    more = [each for each in made.inputs if each != "v"]
+    passed = "".join("c->v, v, " if each == "v" else f"{each}0, {each}1, " for each in made.inputs)
+    force = "force"
+    if math.isfinite(given.limit):
+        most = number_text(given.limit)
+        force = f"force > {most} ? {most} : force < -{most} ? -{most} : force"
+    text = filled(
+        "c/compensator.h",
+        name=made.name,
+        guard=made.name.upper(),
+        title=safe(given.friction.model.chart.name),
+        period=number_text(given.period),
+        feedback=number_text(given.feedback),
+        gain=number_text(given.gain),
+        velocity=velocity,
+        measured=", double measured" if measured else "",
+        said="; measured: the measured velocity" if measured else "",
+        arguments="".join(f", double {each}0, double {each}1" for each in more),
+        passed=passed,
+        force=force,
+    )
+    return {f"{made.name}_compensator.h": text}
 
 
 def _main(made: CEngine) -> str:
@@ -154,6 +187,6 @@ register(
         "gms-fsm",
         c99,
         words=WORDS,
-        takes=TAKES,
+        takes=(*TAKES, "compensator"),
     )
 )
