@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gms_fsm.errors import MissingExtraError, OutputError
 from gms_fsm.foundation.arguments import checked_kind, checked_path
 from gms_fsm.foundation.files import csv_text, output_folder, refuse_input, write_text
+from gms_fsm.foundation.quantities import in_words
 from gms_fsm.foundation.text import plain, table_lines
 from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
@@ -159,6 +160,7 @@ def _page(
         ["## What the record cannot tell", "", *_doubts(fit)],
         _profiles(profiles),
         ["## How well it fits", "", *_scores(fit, residuals)],
+        ["## How far it reaches", "", *_reach(fit)],
         ["## Choice among candidates", "", *_choice(fit.choice)] if fit.choice else [],
         ["## What was done", "", *_done(fit)],
         ["## Records", "", *_records(fit)],
@@ -268,6 +270,23 @@ def _scores(fit: Fit, residuals: Sequence[Residuals]) -> list[str]:
     return lines
 
 
+def _reach(fit: Fit) -> list[str]:
+    """Return what was met in training; what lies outside of it is not known."""
+    met = fit.reach
+    unit = fit.task.measured.unit
+    shares = {
+        state: [each.shares[state] for each in met] for each in met[:1] for state in each.shares
+    }
+    told = [f"{state} {min(own):.0%} to {max(own):.0%}" for state, own in shares.items()]
+    return [
+        f"- amplitude: up to {in_words(max(each.amplitude for each in met), 'm', 3)}",
+        f"- speed at changes of state: up to {in_words(max(each.speed for each in met), 'm/s', 3)}",
+        f"- force at rest: up to {in_words(max(each.rest for each in met), unit, 3)}",
+        f"- share of time by state: {plain(', '.join(told)) or 'one state'}",
+        "- what a motion does beyond, `found.outside(record)` says, and a prediction warns of it",
+    ]
+
+
 def _rmse(each: Residuals, mask: NDArray[np.bool_]) -> str:
     difference = (each.measured - each.modelled)[mask]
     return f"{float(np.sqrt(np.mean(difference**2))):.4g}" if difference.size else "–"
@@ -282,16 +301,21 @@ def _choice(choice: Choice) -> list[str]:
             f"{each.rmse:.4g}",
             f"{each.r2:.4f}",
             f"{each.bic:.4g}",
+            *(
+                "–" if np.isnan(value) else f"{value:.4g}"
+                for value in (each.by_amplitude, each.by_speed)
+            ),
             f"{each.seconds:.3g}",
-            plain(each.note),
+            plain(each.note or each.why),
         ]
         for each in choice.rows
     ]
-    heads = ["candidate", "reason", "free", "RMSE", "R²", "BIC", "time [s]", "note"]
+    heads = ["candidate", "reason", "free", "RMSE", "R²", "BIC", "by amplitude", "by speed"]
     return [
-        *table_lines(heads, rows),
+        *table_lines([*heads, "time [s]", "note"], rows),
         "",
-        "RMSE and R² are of the rows left out in each fold; BIC counts effective rows.",
+        "RMSE and R² are of the rows left out in each fold; by amplitude and by speed, of all "
+        "records of one amplitude or speed left out at a time. BIC counts effective rows.",
     ]
 
 

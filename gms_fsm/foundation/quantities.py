@@ -295,7 +295,7 @@ def plain(unit: str) -> str:
     Returns
     -------
     str
-        Without spaces around it, and with ``u`` for micro, ``deg`` for ``°``, ``rpm`` for ``1/min``.
+        Without spaces around it, with ``u`` for micro, ``deg`` for ``°``, ``rpm`` for ``1/min``.
 
     Examples
     --------

@@ -144,6 +144,8 @@ class Candidate:
     build : callable
         Makes the `FitStart` from records, of which it may read the force at the selected rows only,
         and the time constant of the motion's smoothing spline.
+    inputs : tuple of str
+        What it reads of the records besides their motion.
 
     Examples
     --------
@@ -154,6 +156,7 @@ class Candidate:
     name: str
     reason: str
     build: Build
+    inputs: tuple[str, ...] = ()
 
 
 # --------------------------------------------------------------------------- starts

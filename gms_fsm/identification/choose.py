@@ -18,11 +18,14 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import GMSError, ParameterError, RecordError, shown
-from gms_fsm.foundation.arguments import checked_kind, listed, one_of, refusing
+from gms_fsm.foundation.arguments import checked_kind, listed, refusing
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, FitStart
+from gms_fsm.identification.certainty.assess import AT_BOUND, Estimate
 from gms_fsm.identification.certainty.statistics import correlation_time
 from gms_fsm.identification.fit import checked_records, fitted, options_of, task_of, window_of
-from gms_fsm.identification.problem.experiment import Point
+from gms_fsm.identification.folds import Folds, Parts, folds_of
+from gms_fsm.identification.joints import joint_candidates
+from gms_fsm.identification.problem.experiment import Point, value_of
 from gms_fsm.identification.problem.runs import ThreadPool
 from gms_fsm.identification.problem.search import Best, refine
 from gms_fsm.identification.problem.task import (
@@ -35,18 +38,15 @@ from gms_fsm.identification.problem.task import (
 )
 from gms_fsm.identification.problem.unknowns import unknowns_of
 from gms_fsm.identification.result import Choice, ChoiceRow, Fit
-from gms_fsm.records.parts import only, thinned
+from gms_fsm.records.parts import thinned
 from gms_fsm.records.record import Record
 from gms_fsm.systems.mounted import mounted_alone
 
-__all__ = ["choose", "period_of"]
+__all__ = ["choose", "simplest"]
 
-FOLDS = ("record", "cycles")
-BLOCKS = 4  # of time, where a record is folded by its cycles
 ROWS, FEWEST_ROWS = 4000, 300  # of all records together, and of each, for comparing candidates
+RISE = 0.01  # of the error, for which a term is given up
 STEP, EVALUATIONS = 1e-3, 10  # of the refinement in a fold
-REPEATS = 0.5  # least autocorrelation of a motion that repeats
-NEARLY = 0.1  # of a cycle may be missing at the end
 INTERRUPTED = "The choice was interrupted: {done} of {all} candidates were compared."
 
 
@@ -59,13 +59,14 @@ def choose(
     records: Record | Sequence[Record],
     *,
     candidates: Any = None,
-    fold: Literal["record", "cycles"] | None = None,
+    fold: Literal["record", "cycles", "amplitude", "speed"] | None = None,
     cycles: float | None = None,
     train: tuple[float, float] | None = None,
     test: tuple[float, float] | None = None,
     smoothing: float | None = None,
     seed: int = 0,
     most_steps: int | None = None,
+    weight: Literal["rows", "records"] | None = None,
     progress: bool | None = None,
 ) -> Fit:
     """Compare kinds of models on what each has not seen; return the best, fitted to all rows.
@@ -81,19 +82,24 @@ def choose(
         With a force; several are one experiment.
     candidates : sequence of Candidate or of (name, model, free), or mapping, optional
         What to try; of a mapping the values are ``(model, free)``. By default
-        `gms_fsm.identification.candidates.CANDIDATES`.
-    fold : {"record", "cycles"}, optional
-        What is left out: one record at a time, or one of four stretches of each record, which begin
-        where the motion repeats. By default records if there are several.
+        `gms_fsm.identification.candidates.CANDIDATES`, or for records that give inputs those of
+        `gms_fsm.identification.joints.JOINTS` that read no others.
+    fold : {"record", "cycles", "amplitude", "speed"}, optional
+        What is left out: one record at a time; one of four stretches of each record, which begin
+        where the motion repeats; or all records of one amplitude, or of one speed. By default
+        records if there are several. The scores by amplitude and by speed are in the rows of the
+        choice in any case: they tell how a model fares beyond what it has seen.
     cycles : float, optional
         Period of the motion, s; by default that of its autocorrelation.
-    train, test, smoothing, seed, most_steps, progress
+    train, test, smoothing, seed, most_steps, weight, progress
         As in `fit`.
 
     Returns
     -------
     Fit
-        With ``choice``: a row for each candidate, with its error on what was left out.
+        With ``choice``: a row for each candidate, with its error on what was left out, and why it
+        was not chosen. Terms that the records cannot tell are left out of the chosen model if the
+        error rises by less than 1 %, see `Fit.simplest`.
 
     Raises
     ------
@@ -130,11 +136,12 @@ def choose(
         begin=None,
         nuisance=("offset",),
         bounds={},
+        weight=weight,
     )
-    tried = _checked_candidates(candidates)
+    tried = _checked_candidates(candidates, every)
     seen = [_training_rows(record, common) for record in every]
     enough = max(FEWEST_ROWS, ROWS // len(seen))
-    folds = _folds([thinned(each, enough) for each in seen], fold, common)
+    folds = folds_of([thinned(each, enough) for each in seen], fold, common)
     began = time.perf_counter()
     results: list[_Tried] = []
     rows: list[ChoiceRow] = []
@@ -161,7 +168,7 @@ def choose(
         told(len(tried) / (len(tried) + 1))
     best = _chosen(results)
     effective = min(results, key=lambda each: each.mean).effective
-    rows += [each.row(effective) for each in results]
+    rows += [each.row(effective, _why(each, best)) for each in results]
     order = {each.name: i for i, each in enumerate(tried)}
     rows.sort(key=lambda row: order[row.name])
     fit = _final(best, every, common)
@@ -183,10 +190,11 @@ def _checked_records(records: Any) -> list[Record]:
     return given
 
 
-def _checked_candidates(given: Any) -> list[Candidate]:
+def _checked_candidates(given: Any, records: Sequence[Record]) -> list[Candidate]:
     """Return candidates; those of the user start from their own model."""
-    if given is None:
-        return list(CANDIDATES)
+    if given is None:  # loads and temperatures tell of a joint
+        joint = all(each.inputs for each in records)
+        return list(joint_candidates(records) if joint else CANDIDATES)
     wanted = "candidates: Candidate(...), or (name, model, free)"
     if isinstance(given, Mapping):
         given = [(name, *_parts(name, value, 2)) for name, value in given.items()]
@@ -249,134 +257,6 @@ def _training_rows(record: Record, options: FitOptions) -> Record:
     return replace(record, columns=columns, chosen=chosen[:last], rows=record.rows[:last])
 
 
-@dataclass(frozen=True, eq=False)
-class _Folds:
-    """What is fitted to and what is left out, in few rows.
-
-    Parameters
-    ----------
-    all : tuple of Record
-        Everything.
-    parts : tuple of (tuple of Record, tuple of Record)
-        Fitted to, and left out.
-    """
-
-    all: tuple[Record, ...]
-    parts: tuple[tuple[tuple[Record, ...], tuple[Record, ...]], ...]
-
-
-def _folds(records: Sequence[Record], fold: Any, options: FitOptions) -> _Folds:
-    if fold is None:
-        fold = FOLDS[0] if len(records) > 1 else FOLDS[1]
-    one_of("fold", fold, FOLDS)
-    every = tuple(records)
-    if fold == "record":
-        if len(every) < 2:
-            raise ParameterError(
-                "there is only one record",
-                place="fold",
-                value=fold,
-                advice="give several, or fold='cycles'",
-            )
-        parts = [(every[:i] + every[i + 1 :], (every[i],)) for i in range(len(every))]
-        return _Folds(every, tuple(parts))
-    blocks = [_blocks(record, options.cycles) for record in every]
-    count = min(int(block.max()) + 1 for block in blocks)
-    return _Folds(
-        every,
-        tuple(
-            (
-                tuple(
-                    only(record, block % count != i)
-                    for record, block in zip(every, blocks, strict=True)
-                ),
-                tuple(
-                    only(record, block % count == i)
-                    for record, block in zip(every, blocks, strict=True)
-                ),
-            )
-            for i in range(count)
-        ),
-    )
-
-
-def _blocks(record: Record, cycles: float | None) -> Any:
-    """Return for each row the number of its block, from 0; blocks begin where cycles do."""
-    t = record.columns["time"]
-    period = cycles or period_of(t[record.chosen], record.columns["position"][record.chosen])
-    if period is None:
-        raise RecordError(
-            "its motion does not repeat",
-            place=record.place,
-            advice="give cycles=period (s), or several records and fold='record'",
-        )
-    first, last = t[record.chosen][[0, -1]]
-    whole = int((last - first) / period + NEARLY)
-    if whole < 2:
-        raise RecordError(
-            f"its training rows last {last - first:.4g} s, less than two cycles of {period:.4g} s",
-            place=record.place,
-            advice="give a longer record or train, a shorter cycles=..., or several records and "
-            "fold='record'",
-        )
-    count = min(BLOCKS, whole)
-    borders = first + period * np.round(np.arange(1, count) * whole / count)
-    return np.searchsorted(borders, t, side="right")
-
-
-def period_of(t: FloatArray, x: FloatArray) -> float | None:
-    """Return the period of a motion, from the autocorrelation of its position.
-
-    Parameters
-    ----------
-    t : ndarray, shape (rows,)
-        Times, s.
-    x : ndarray, shape (rows,)
-        Positions, m.
-
-    Returns
-    -------
-    float or None
-        s; None if it does not repeat within the record.
-
-    Examples
-    --------
-    >>> t = np.arange(0.0, 30.0, 0.01)
-    >>> round(period_of(t, np.sin(2 * np.pi * t / 4.0)), 3)
-    4.0
-    """
-    even = np.linspace(t[0], t[-1], t.size)
-    values = np.interp(even, t, x)
-    values = values - values.mean()
-    size = 1 << (2 * values.size - 1).bit_length()
-    spectrum = np.abs(np.fft.rfft(values, size)) ** 2
-    lags = np.arange(values.size // 2 + 1)
-    similar = np.fft.irfft(spectrum, size)[lags] / (values.size - lags)
-    if similar[0] <= 0.0:
-        return None
-    similar /= similar[0]
-    below = np.flatnonzero(similar < 0.0)
-    if not below.size:
-        return None
-    after = similar[below[0] :]
-    best = int(np.argmax(after))
-    if after[best] < REPEATS:
-        return None
-    # The first of the peaks that are as high: later ones are multiples of the period.
-    high = int(np.argmax(after > after[best] - 0.5 * (1.0 - REPEATS)))
-    falls = np.flatnonzero(np.diff(after[high:]) < 0.0)
-    peak = float(below[0] + high + (int(falls[0]) if falls.size else 0))
-    # The ends of a short record shift the peak; a distance of many cycles does not depend on them.
-    many = 1
-    while many * peak < 0.5 * values.size:
-        reach = max(2.0, 0.1 * peak)
-        near = np.arange(round(many * peak - reach), round(many * peak + reach) + 1)
-        near = near[(near > 0) & (near < values.size)]
-        apart = [float(np.mean((values[lag:] - values[:-lag]) ** 2)) for lag in near]
-        peak, many = float(near[int(np.argmin(apart))]) / many, 2 * many
-    return float(peak * (even[1] - even[0]))
-
-
 # --------------------------------------------------------------------------- candidates
 @dataclass(frozen=True, eq=False)
 class _Tried:
@@ -391,6 +271,7 @@ class _Tried:
     variance: float  # of the force on what was left out, N^2
     effective: float
     seconds: float
+    others: Mapping[str, float]  # RMSE of folds by amplitude and by speed
 
     @property
     def name(self) -> str:
@@ -405,7 +286,7 @@ class _Tried:
         """Mean squared error on what was left out."""
         return float(self.squares.sum() / self.counts.sum())
 
-    def row(self, effective: float) -> ChoiceRow:
+    def row(self, effective: float, why: str) -> ChoiceRow:
         residual = self.point.residual
         cost = max(float(residual @ residual) / residual.size, 1e-300)
         bic = effective * math.log(cost) + self.free * math.log(max(effective, 2.0))
@@ -417,13 +298,15 @@ class _Tried:
             1.0 - self.mean / self.variance if self.variance else math.nan,
             bic,
             self.seconds,
+            why=why,
+            **{f"by_{name}": value for name, value in self.others.items()},
         )
 
 
 def _try(
     candidate: Candidate,
     records: Sequence[Record],
-    folds: _Folds,
+    folds: Folds,
     options: FitOptions,
     pool: ThreadPool,
 ) -> _Tried | ChoiceRow:
@@ -448,13 +331,20 @@ def _try(
             lost = task.coarse.start_point().lost
             raise lost if lost is not None else ParameterError("no proposal could be run")
         point = best.point
-        scored = [_scored(task, point, kept, left, pool) for kept, left in folds.parts]
+
+        def scored(parts: Parts) -> tuple[FloatArray, FloatArray]:
+            found = np.array([_scored(task, point, candidate, *part, pool) for part in parts])
+            return found[:, 0], found[:, 1]
+
+        squares, counts = scored(folds.parts)
+        others = {}
+        for name, parts in folds.others.items():
+            sums, rows = scored(parts)
+            others[name] = math.sqrt(float(sums.sum() / rows.sum()))
     except GMSError as error:
-        seconds = time.perf_counter() - began
-        nothing = math.nan
-        return ChoiceRow(
-            candidate.name, candidate.reason, 0, nothing, nothing, nothing, seconds, str(error)
-        )
+        seconds, nothing = time.perf_counter() - began, math.nan
+        name, reason, note = candidate.name, candidate.reason, str(error)
+        return ChoiceRow(name, reason, 0, nothing, nothing, nothing, seconds, note, "failed")
     parts = stretches(task.coarse.courses, point.residual)
     force = np.concatenate([each.columns["force"][each.chosen] for each in folds.all])
     return _Tried(
@@ -462,20 +352,35 @@ def _try(
         start,
         task,
         point,
-        np.array([squares for squares, _ in scored]),
-        np.array([count for _, count in scored]),
+        squares,
+        counts,
         float(np.var(force)),
         max(point.residual.size / correlation_time(parts), 2.0),
         time.perf_counter() - began,
+        others,
     )
 
 
 def _scored(
-    task: Task, point: Point, kept: tuple[Record, ...], left: tuple[Record, ...], pool: ThreadPool
+    task: Task,
+    point: Point,
+    candidate: Candidate,
+    kept: tuple[Record, ...],
+    left: tuple[Record, ...],
+    pool: ThreadPool,
 ) -> tuple[float, float]:
-    """Return the sum of squares and the number of rows on what was left out."""
+    """Return the sum of squares and the number of rows on what was left out.
+
+    A candidate without a search is built anew from the rest.
+    """
     own = replace(task, records=kept)
-    refined = refine(own.coarse, point.u, STEP, EVALUATIONS, pool)
+    if task.coarse.searched:
+        refined = refine(own.coarse, point.u, STEP, EVALUATIONS, pool)
+    else:
+        start = candidate.build(kept, None)
+        options = replace(task.options, free=start.free, tied=start.tied, bounds=start.bounds)
+        own = replace(task_of(kept, start.model, {}, options), begin=task.begin)
+        refined = own.coarse.start_point()
     if refined.lost is not None:
         raise refined.lost
     squares, count = 0.0, 0
@@ -490,18 +395,35 @@ def _scored(
 def _chosen(results: Sequence[_Tried]) -> _Tried:
     """Return the candidate with the fewest unknowns within one standard error of the best."""
     best = min(results, key=lambda each: each.mean)
-    rows = best.counts.sum()
-
-    def is_as_good(other: _Tried) -> bool:
-        worse = other.squares - best.squares
-        excess = worse.sum() / rows
-        scatter = worse - excess * best.counts
-        folds = worse.size
-        error = math.sqrt(folds / (folds - 1) * float(scatter @ scatter)) / rows
-        return bool(excess <= error)
-
-    good = [each for each in results if is_as_good(each)]
+    good = [each for each in results if _is_as_good(each, best)]
     return min(good, key=lambda each: (each.free, each.mean))
+
+
+def _is_as_good(other: _Tried, best: _Tried) -> bool:
+    """Return whether it is within one standard error of another, of the differences of folds."""
+    rows, folds = best.counts.sum(), best.counts.size
+    worse = other.squares - best.squares
+    excess = worse.sum() / rows
+    scatter = worse - excess * best.counts
+    error = math.sqrt(folds / (folds - 1) * float(scatter @ scatter)) / rows
+    return bool(excess <= error)
+
+
+def _why(each: _Tried, chosen: _Tried) -> str:
+    """Say why a candidate was not chosen."""
+    if each is chosen:
+        return "chosen"
+    share = math.sqrt(each.mean / chosen.mean) - 1.0
+    means = each.squares / each.counts > chosen.squares / chosen.counts
+    worse = f"in {int(means.sum())} of {means.size} folds"
+    if share > 0.0 and each.free >= chosen.free:
+        return f"{share:.0%} worse on what was left out, {worse}"
+    if share > 0.0:
+        return f"{share:.0%} worse on what was left out, {worse}, though with fewer unknowns"
+    return (
+        f"{-share:.0%} better on what was left out, which is within the scatter of folds, with "
+        f"{each.free - chosen.free} more unknowns"
+    )
 
 
 def _final(best: _Tried, records: Sequence[Record], options: FitOptions) -> Fit:
@@ -514,5 +436,75 @@ def _final(best: _Tried, records: Sequence[Record], options: FitOptions) -> Fit:
         search="local",
         begin=best.task.begin,
     )
-    model = best.task.coarse.fitted(best.point).made_of
-    return fitted(task_of(records, model, {}, own))
+    if best.task.coarse.searched:
+        model = best.task.coarse.fitted(best.point).made_of
+    else:  # all rows tell more terms than a few
+        start = best.candidate.build(records, options.smoothing)
+        model, own = start.model, replace(own, free=start.free)
+    return simplest(fitted(task_of(records, model, {}, own)))
+
+
+# --------------------------------------------------------------------------- simpler
+def simplest(fit: Fit) -> Fit:
+    """Return a fit without terms that cannot be told or stand at a bound.
+
+    One after the other is left out, that which is missed least first, and the rest fitted anew; a
+    fit is kept while its error rises by less than 1 %. What the force is linear in becomes 0, any
+    other number keeps its value and is no longer found.
+
+    Parameters
+    ----------
+    fit : Fit
+        From `gms_fsm.fit`.
+
+    Returns
+    -------
+    Fit
+        With fewer unknowns, and a note on each that is gone; the same fit if there are none.
+    """
+    gone = list[str]()
+    while True:
+        weak = [each for each in fit.table if not each.told or each.note == AT_BOUND]
+        tries = list[tuple[float, str, Task]]()
+        for each in weak:
+            try:
+                task, what = _without(fit, each)
+                point = task.fine.start_point()
+            except GMSError:  # nothing would be left
+                continue
+            if point.lost is None:
+                tries.append((point.cost, what, task))
+        most = fit.point.cost * (1.0 + RISE) ** 2
+        for cost, what, task in sorted(tries, key=lambda each: each[0]):
+            if cost > most and not task.fine.searched:
+                continue  # nothing else would move
+            options = replace(task.options, search="local")
+            try:
+                smaller = fitted(replace(task, options=options))
+            except GMSError:
+                continue
+            if smaller.point.cost <= most:
+                gone.append(what)
+                break
+        else:
+            if gone:
+                told = f"left out, as the records cannot tell them: {', '.join(gone)}"
+                fit = replace(fit, notes=(*fit.notes, told))
+            return fit
+        fit = replace(smaller, choice=fit.choice)
+
+
+def _without(fit: Fit, each: Estimate) -> tuple[Task, str]:
+    """Return the task without a term, and what became of it."""
+    task = fit.task
+    if each.name in fit.nuisance:
+        kept = tuple(name for name in fit.nuisance if name != each.name)
+        return replace(task, options=replace(task.options, nuisance=kept)), each.name
+    unknown = next(one for one in task.unknowns if one.name == each.name)
+    linear = any(one.name == each.name for one in task.fine.solved)
+    zero = linear and not unknown.parameter.rule.startswith("> 0")
+    value = 0.0 if zero else value_of(task.subject, unknown)
+    if len(task.unknowns) < 2:
+        raise ParameterError("nothing would be left", place="free")
+    other = task.without(each.name, value)
+    return other, each.name if zero else f"{each.name} (held at {value:.4g} {each.unit})".rstrip()

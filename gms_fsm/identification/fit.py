@@ -8,6 +8,7 @@ steps, so that none can hang a fit.
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
@@ -61,6 +62,7 @@ STOPPED = "The search was interrupted: this is the best so far."
 STOPPED_LATE = "Interrupted before the intervals were known: this is the best so far."
 FEWEST_ROWS = 20
 AGAIN = 3  # searches from a better point met while looking for the ends of intervals
+FOLLOWS, IGNORES = 0.75, 0.3  # mean products of signs
 LOAD_DIFFERS = 0.05  # relative
 STILL = 1e-9  # of its size: a column that varies less is constant
 
@@ -380,9 +382,22 @@ def _check_records(task: Task) -> None:
         )
 
 
+def _follows_position(record: Record) -> bool:
+    """Return whether a force has the sign of what was given as a position, not of its velocity."""
+    if "position" not in record.columns or "velocity" in record.columns:
+        return False
+    motion, rows = record.motion(), record.chosen
+    force = record.columns["force"][rows]
+    sign = np.sign(force - np.median(force))
+    x, v = motion.position[rows], motion.velocity[rows]
+    alike = [abs(float(np.mean(sign * np.sign(each - np.median(each))))) for each in (x, v)]
+    return alike[0] > FOLLOWS and alike[1] < IGNORES
+
+
 def _check_loads(task: Task) -> None:
     """Refuse records with loads that differ, if the model reads a load and is not given theirs."""
-    mean = [float(each.columns["normal"].mean()) for each in task.records if "normal" in each.columns]
+    given = [each.columns["normal"] for each in task.records if "normal" in each.columns]
+    mean = [float(np.nanmean(each)) for each in given]
     if "N" in task.bound or "N" not in task.subject.bindable or len(mean) < 2:
         return
     if np.ptp(mean) > LOAD_DIFFERS * np.abs(mean).max():
@@ -554,10 +569,16 @@ def _notes(task: Task, silent: Sequence[str]) -> tuple[str, ...]:
         )
     else:
         notes.append("each record begins with the initial state of the chart")
+    for record in task.records:
+        if task.measured.column == "force" and _follows_position(record):
+            told = (
+                f"{record.place}: the force has the sign of the position, as friction has that of "
+                "a velocity; if the column is a velocity, give velocity= in place of position="
+            )
+            notes.append(told)
+            warnings.warn(told, stacklevel=3)
     if task.starts:
-        notes.append(
-            f"the states in which {len(task.starts)} stretch(es) begin were found, too"
-        )
+        notes.append(f"the states in which {len(task.starts)} stretch(es) begin were found, too")
     if task.fine.weights:
         notes.append("each record counts alike, however long it is (weight)")
     unread = {name for record in task.records for name in record.inputs} - {*task.bound}

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from gms_fsm.charts.chart import Chart
@@ -18,16 +19,15 @@ from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.charts.zoo.bristles.maxwell_slip import MAXWELL_SLIP
 from gms_fsm.errors import RecordError
 from gms_fsm.identification.bank import stop_operators
-from gms_fsm.records.parts import thinned
 from gms_fsm.records.record import Record
 
 __all__ = ["SPRING_WITH_PLAY", "PlayBank", "play_bank"]
 
-ROWS, FEWEST_ROWS = 12_000, 900  # of all records together, and of each
+ROWS, FEWEST_ROWS = 5_000, 300  # of all records together, and of each
 # Shares of half the travel: thresholds, of which the largest never slips, and half gaps.
 THRESHOLDS = np.array([0.2, 0.5, 1, 2, 4, 6, 8, 10, 12, 15, 20, 30, 60]) / 60
 GAPS = np.array([0, 0.2, 0.5, 1, 2, 3, 4, 5, 6, 8, 10]) / 60
-SPEEDS = (0.5, 1.0, 2.0, 4.0)  # v_s as multiples of the median speed in motion
+SPEEDS = (1.0, 2.0, 4.0)  # v_s as multiples of the median speed in motion
 RISE = 0.02  # of the sum of squares, for which terms may be taken away altogether: 1 % of the error
 TERMS = ("k_f", "k_b", "d_f", "d_b")
 
@@ -99,7 +99,7 @@ class _Part:
     x: FloatArray
     v: FloatArray
     force: FloatArray
-    rows: FloatArray
+    rows: NDArray[np.bool_]
     weight: float
 
 
@@ -115,7 +115,7 @@ def play_bank(records: Sequence[Record], smoothing: float | None) -> PlayBank:
     pairs = np.array([(s, g) for s in THRESHOLDS for g in GAPS if g < s]) * 0.5 * travel
     best: tuple[float, float, FloatArray, FloatArray] | None = None
     for v_s in (share * middle for share in SPEEDS):
-        gram = sum(_gram(part, pairs, v_s) for part in parts)
+        gram = np.sum([_gram(part, pairs, v_s) for part in parts], axis=0)
         shares, squares = _solved(gram, np.arange(gram.shape[0] - 1))
         if best is None or squares < best[0]:
             best = squares, v_s, gram, shares
@@ -158,7 +158,7 @@ def _gram(part: _Part, pairs: FloatArray, v_s: float) -> FloatArray:
     return found
 
 
-def _solved(gram: FloatArray, kept: FloatArray) -> tuple[FloatArray, float]:
+def _solved(gram: FloatArray, kept: NDArray[np.intp]) -> tuple[FloatArray, float]:
     """Return the non-negative least squares of some terms, and their sum of squares."""
     places = np.append(kept, gram.shape[0] - 1)
     part = gram[np.ix_(places, places)]
@@ -171,16 +171,20 @@ def _solved(gram: FloatArray, kept: FloatArray) -> tuple[FloatArray, float]:
     return found, float((left * scale[-1]) ** 2)
 
 
-def _fewest(gram: FloatArray, kept: FloatArray, most: float) -> FloatArray:
+def _fewest(gram: FloatArray, kept: NDArray[np.intp], most: float) -> NDArray[np.intp]:
     """Return the terms that are left when all that hardly help are taken away, one by one."""
     offset = gram.shape[0] - 3  # both signs of it stay
     while True:
-        tries = [
-            (_solved(gram, np.delete(kept, i))[1], i)
-            for i in range(kept.size)
-            if kept[i] < offset
-        ]
-        squares, least = min(tries, default=(np.inf, 0))
-        if squares > most:
-            return kept
-        kept = np.delete(kept, least)
+        shares, _ = _solved(gram, kept)
+        own = kept[shares[kept] > 0.0]
+        scale = np.sqrt(np.diag(gram)[own])
+        inverse = np.linalg.pinv(gram[np.ix_(own, own)] / scale / scale[:, None])
+        # What the sum of squares rises by without a term, if all others may have any sign.
+        rises = (shares[own] * scale) ** 2 / np.maximum(np.diag(inverse), 1e-300)
+        terms = np.flatnonzero(own < offset)
+        if terms.size < 2:
+            return own
+        fewer = np.delete(own, terms[np.argmin(rises[terms])])
+        if _solved(gram, fewer)[1] > most:
+            return own
+        kept = fewer

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.foundation.quantities import in_words
 from gms_fsm.foundation.arguments import checked_kind
+from gms_fsm.foundation.quantities import in_words
 from gms_fsm.identification.problem.beginning import estimated
 from gms_fsm.identification.problem.experiment import Experiment
 from gms_fsm.identification.problem.runs import AT_REST, Course
@@ -98,3 +99,20 @@ def predicted(fit: Fit, record: Record, initial: Any, lead: float) -> FloatArray
         checked_kind("initial", initial, Mapping, "'estimate', or a mapping such as {'z': 0}")
         along = [along[0].begun(initial), *along[1:]]
     return at_all_rows(fine, fit.point, along)
+
+
+def without_change(experiment: Experiment, subject: Mounted) -> tuple[int, ...]:
+    """Return the elements, from 1, that keep their initial state in all training rows."""
+    if not any(contact.chart.transitions for contact in subject.system.contacts):
+        return ()
+    kept: NDArray[np.bool_] = np.array(True)
+    for course in experiment.courses:
+        trace = experiment.driver.run(subject, course).trace
+        elements = trace.program.layout.elements
+        initial = experiment.driver.start(subject, course).mode[elements]
+        same = (trace.rows.mode[course.rows, elements] == initial).all(axis=0)
+        first, last = course.t[course.rows][[0, -1]]
+        t = trace.firings.t
+        same[trace.firings.machine[(t > first) & (t <= last)]] = False
+        kept = kept & same
+    return tuple(int(i) + 1 for i in np.flatnonzero(kept))

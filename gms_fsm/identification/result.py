@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError, RecordError, shown
@@ -28,46 +27,25 @@ from gms_fsm.foundation.display import asked, displayed
 from gms_fsm.foundation.extras import missing
 from gms_fsm.foundation.text import visible
 from gms_fsm.identification.certainty.assess import Assessed, Estimate
-from gms_fsm.identification.certainty.compared import Choice, ChoiceRow, FitComparison, score_of
+from gms_fsm.identification.certainty.compared import (
+    Choice,
+    ChoiceRow,
+    FitComparison,
+    lines_of,
+    score_of,
+)
 from gms_fsm.identification.certainty.intervals import Bootstrap, bootstrapped, profiled
 from gms_fsm.identification.certainty.profile import Profile
-from gms_fsm.identification.certainty.statistics import phase_floor
+from gms_fsm.identification.certainty.residuals import Residuals, floor_of, residuals_of
 from gms_fsm.identification.problem.experiment import Point
-from gms_fsm.identification.problem.runs import BEGINS, MOVING, Course
-from gms_fsm.identification.problem.task import Task, at_all_rows, inside, training_rows
-from gms_fsm.identification.reach import Reach, outside, predicted, reach_of
+from gms_fsm.identification.problem.runs import BEGINS, MOVING
+from gms_fsm.identification.problem.task import Task
+from gms_fsm.identification.reach import Reach, outside, predicted, reach_of, without_change
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import System
-from gms_fsm.traces.trace import Trace
 
 __all__ = ["Choice", "ChoiceRow", "Estimate", "Fit", "FitComparison", "Residuals", "score_of"]
-
-
-@dataclass(frozen=True, eq=False)
-class Residuals:
-    """Measurement and model at all rows of a record.
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-    t, x, v : ndarray, shape (rows,)
-        Time, s, and the motion: m, m/s.
-    measured, modelled : ndarray, shape (rows,)
-        What was compared; nuisance terms are in the model.
-    rows, held : ndarray of bool, shape (rows,)
-        The rows that were trained on, and those that were held out.
-    """
-
-    record: Record
-    t: FloatArray
-    x: FloatArray
-    v: FloatArray
-    measured: FloatArray
-    modelled: FloatArray
-    rows: NDArray[np.bool_]
-    held: NDArray[np.bool_]
 
 
 @refusing()
@@ -168,22 +146,7 @@ class Fit:
 
         Whatever a record does before these rows, in them such an element acts as a spring.
         """
-        if not any(contact.chart.transitions for contact in self.task.subject.system.contacts):
-            return ()
-        kept: NDArray[np.bool_] = np.array(True)
-        for course in self.task.courses:
-            trace = self._ran(course)
-            elements = trace.program.layout.elements
-            initial = self.task.fine.driver.start(self.task.subject, course).mode[elements]
-            same = (trace.rows.mode[course.rows, elements] == initial).all(axis=0)
-            first, last = course.t[course.rows][[0, -1]]
-            t = trace.firings.t
-            same[trace.firings.machine[(t > first) & (t <= last)]] = False
-            kept = kept & same
-        return tuple(int(i) + 1 for i in np.flatnonzero(kept))
-
-    def _ran(self, course: Course) -> Trace:
-        return self.task.fine.driver.run(self.task.subject, course).trace
+        return without_change(self.task.fine, self.task.subject)
 
     # ------------------------------------------------------------------ how it was found
     @property
@@ -248,13 +211,7 @@ class Fit:
         """Repeatability: distance of cycles from their mean; None if `cycles` was not given."""
         if self.cycles is None:
             return None
-        squares, count = 0.0, 0
-        for course in self.task.courses:
-            rows = course.rows
-            found = phase_floor(course.t[rows], course.measured[rows], self.cycles)
-            if math.isfinite(found):
-                squares, count = squares + found**2 * rows.sum(), count + int(rows.sum())
-        return math.sqrt(squares / count) if count else None
+        return floor_of(self.task, self.cycles)
 
     def bic(self, effective: float | None = None) -> float:
         """Return the Bayesian information criterion on effective rows; lower is better.
@@ -300,17 +257,7 @@ class Fit:
 
     @cached_property
     def _residuals(self) -> tuple[Residuals, ...]:
-        found = []
-        for record in self.records:
-            along = self.task.along(record, None)
-            modelled = at_all_rows(self.task.fine, self.point, along)
-            motion, rows = record.motion(self.smoothing), record.chosen & np.isfinite(modelled)
-            t, x, v = motion.time, motion.position, motion.velocity
-            train = training_rows(record, self.task.options) & rows
-            held = (inside(t, self.test) if self.test else np.zeros(len(record), bool)) & rows
-            measured = record.columns[self.task.measured.column]
-            found.append(Residuals(record, t, x, v, measured, modelled, train, held))
-        return tuple(found)
+        return tuple(residuals_of(self.task, self.point))
 
     def predict(
         self,
@@ -353,9 +300,7 @@ class Fit:
         found = predicted(self, record, initial, checked_scalar("lead", lead, "> 0"))
         if doubts := self.outside(record):
             told = "; ".join(doubts)
-            warnings.warn(
-                f"{record.place}: outside of what was trained on: {told}", stacklevel=2
-            )
+            warnings.warn(f"{record.place}: outside of what was trained on: {told}", stacklevel=2)
         return found
 
     def outside(self, record: Record) -> tuple[str, ...]:
@@ -376,13 +321,14 @@ class Fit:
         unit, found = self.task.measured.unit, dict[str, None]()
         for course in self.task.along(record, None):
             own = reach_of(self.task.fine, self.task.subject, course)
-            found |= dict.fromkeys(outside(own, self._reach, unit))
+            found |= dict.fromkeys(outside(own, self.reach, unit))
         return tuple(found)
 
     @cached_property
-    def _reach(self) -> list[Reach]:
+    def reach(self) -> tuple[Reach, ...]:
+        """What each training record made of the model: amplitude, speeds, force at rest, states."""
         fine, subject = self.task.fine, self.task.subject
-        return [reach_of(fine, subject, course) for course in self.task.courses]
+        return tuple(reach_of(fine, subject, course) for course in self.task.courses)
 
     def score(
         self,
@@ -557,6 +503,21 @@ class Fit:
             name, "", len(self.table), score["rmse"], score["r2"], bic, self.seconds, note
         )
 
+    def simplest(self) -> Fit:
+        """Return the fit without terms that cannot be told or stand at a bound.
+
+        They are left out one by one and the rest is fitted anew, while the error rises by less than
+        1 % each time. What the force is linear in becomes 0; other numbers keep their values.
+
+        Returns
+        -------
+        Fit
+            With fewer unknowns, and a note on what is gone.
+        """
+        from gms_fsm.identification.choose import simplest
+
+        return simplest(self)
+
     # ------------------------------------------------------------------ files
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the fitted model, driven by the motion of the first record, as a scenario.
@@ -653,25 +614,4 @@ class Fit:
         )
 
     def __str__(self) -> str:
-        lines = [f"{'parameter':14s} {'value':>12s}   {'95 % interval':28s} unit"]
-        for each in self.table:
-            value, interval = each.shown
-            note = f"  {each.note}" if each.note else ""
-            lines.append(
-                f"{each.name:14s} {value:>12s}   {interval:28s} {each.unit}{note}".rstrip()
-            )
-        unit = self.task.measured.unit
-        lines.append(_scored("training", self.training, unit))
-        if self.held_out is not None:
-            lines.append(_scored("held out", self.held_out, unit))
-        lines.append(self.weakest)
-        if self.choice is not None:
-            failed = [f"{row.name} failed: {row.note}" for row in self.choice.rows if row.note]
-            count = len(self.choice.rows)
-            lines += [f"chosen among {count} candidates: {self.choice.chosen}", *failed]
-        return "\n".join([*lines, self.stopped] if self.stopped else lines)
-
-
-def _scored(name: str, score: Mapping[str, float], unit: str) -> str:
-    rows = int(score["rows"])
-    return f"{name}: RMSE {score['rmse']:.4g} {unit}, R2 {score['r2']:.5f} ({rows} rows)"
+        return "\n".join(lines_of(self))

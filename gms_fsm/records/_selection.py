@@ -27,8 +27,8 @@ MISSING = ("error", "drop", "interpolate")
 DUPLICATES = ("error", "mean")
 # What instruments write where they have no number, in lower case.
 GAP_WORDS = frozenset(
-    "nan na n/a #n/a null none nil - -- --- ? ovr ovl ovld ol over overflow overrange "
-    "out-of-range invalid error err missing".split()
+    ["nan", "na", "n/a", "#n/a", "null", "none", "nil", "-", "--", "---", "?", "missing"]
+    + ["ovr", "ovl", "ovld", "ol", "over", "overflow", "overrange", "out-of-range", "invalid"]
 )
 Rows: TypeAlias = NDArray[np.int64]
 Chosen: TypeAlias = NDArray[np.bool_]

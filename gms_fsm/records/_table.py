@@ -80,7 +80,9 @@ class TextFormat:
         columns: Any = None,
     ) -> TextFormat:
         """Return the format with these options, checked."""
-        names = None if columns is None or isinstance(columns, str) else tuple(columns)
+        names: tuple[Any, ...] = ()
+        if columns is not None and not isinstance(columns, str):
+            names = tuple(columns)
         marks = (comment,) if isinstance(comment, str) else comment
         try:
             marks = tuple(marks)
@@ -117,7 +119,7 @@ class TextFormat:
         for name, (fits, what) in wanted.items():
             if not fits:
                 raise ParameterError(f"it must be {what}", place=name, value=given[name])
-        return cls(delimiter, decimal, marks, header, encoding, thousands, names)
+        return cls(delimiter, decimal, marks, header, encoding, thousands, names or None)
 
     def number(self, text: str) -> float:
         """Return the number of a cell; raise a `ValueError` for a word."""

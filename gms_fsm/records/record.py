@@ -243,9 +243,9 @@ class Record:
             Condition on the quantities that selects rows, for example ``"normal > 4.5 N"``. It is
             evaluated first: a cell in a row that is not selected need not be a number.
         missing : {"error", "drop", "interpolate"}
-            What to do where a cell is empty, NaN or a word such as OVR in a row that is used: refuse
-            it, leave the row out, or interpolate in time. With the last two a row without a force
-            keeps its motion and is not compared; nor is one whose motion was interpolated.
+            What to do where a cell is empty, NaN or a word such as OVR in a row that is used:
+            refuse it, leave the row out, or interpolate in time. With the last two a row without
+            a force keeps its motion and is not compared; nor is one whose motion was interpolated.
         sort : bool
             Whether to sort the rows by time.
         duplicates : {"error", "mean"}

@@ -10,18 +10,15 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.charts.stribeck import Stribeck
-from gms_fsm.charts.zoo.bristles.bouc_wen import BOUC_WEN
-from gms_fsm.charts.zoo.bristles.dahl import DAHL
-from gms_fsm.identification.bank import initial_bank, stop_operators, thresholds
+from gms_fsm.identification.bank import stop_operators, thresholds
 from gms_fsm.identification.candidates import FitStart, gms
 from gms_fsm.identification.choose import choose
 from gms_fsm.identification.fit import fitted, task_of
+from gms_fsm.identification.joints import bouc_wen, dahl, lugre
 from gms_fsm.identification.problem.task import FitOptions
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.parts import thinned
 from gms_fsm.records.record import Record
-from gms_fsm.systems.models import ChartModel, LuGre
 
 FEW = 1500  # rows of each of several records that a fit is made with; all are predicted
 
@@ -122,41 +119,6 @@ def _maxwell(n: int) -> Train:
 
 
 # --------------------------------------------------------------------------- fits
-def _bank_numbers(records: Sequence[Record], smoothing: float | None) -> tuple[float, float]:
-    """Return stiffness and plateau force of one spring, N/m and N."""
-    bank = initial_bank(records, 1, smoothing=smoothing)
-    return float(bank.parameters.k[0]), bank.stribeck.F_c
-
-
-def _dahl(records: Sequence[Record], smoothing: float | None) -> FitStart:
-    k, F_c = _bank_numbers(records, smoothing)
-    return FitStart(ChartModel(DAHL, {"sigma_0": k, "F_c": F_c}), ("sigma_0", "F_c"))
-
-
-def _lugre(records: Sequence[Record], smoothing: float | None) -> FitStart:
-    k, F_c = _bank_numbers(records, smoothing)
-    speed = np.concatenate([np.abs(each.motion(smoothing).velocity) for each in records])
-    middle = float(np.median(speed[speed > 0.1 * np.quantile(speed, 0.99)]))
-    model = LuGre(
-        sigma_0=k, sigma_1=0.0, sigma_2=0.0, stribeck=Stribeck(F_c, 1.05 * F_c, 0.5 * middle)
-    )
-    return FitStart(
-        model,
-        ("sigma_0", "sigma_2", "F_c", "F_s", "v_s"),
-        bounds={"v_s": (0.05 * middle, 20.0 * middle)},
-    )
-
-
-def _bouc_wen(records: Sequence[Record], smoothing: float | None) -> FitStart:
-    k, F_c = _bank_numbers(records, smoothing)
-    values = {"k": k, "alpha": 0.01, "D": F_c / k, "A": 1.0, "beta": 0.5, "gamma": 0.5, "p": 2.0}
-    return FitStart(
-        ChartModel(BOUC_WEN, values),
-        ("k", "alpha", "D", "gamma", "p"),
-        bounds={"alpha": (1e-6, 0.5), "gamma": (-0.5, 0.499), "p": (1.0, 10.0)},
-    )
-
-
 def _gms(n: int) -> Callable[[Sequence[Record], float | None], FitStart]:
     return lambda records, smoothing: gms(records, smoothing, n=n)
 
@@ -229,9 +191,9 @@ def _few(records: Sequence[Record]) -> list[Record]:
 BOTH = ("tribometer", "damper")
 METHODS = (
     Method("static curve", _static, BOTH),
-    Method("Dahl", _fitted(_dahl)),
-    Method("LuGre", _fitted(_lugre)),
-    Method("Bouc-Wen", _fitted(_bouc_wen)),
+    Method("Dahl", _fitted(dahl)),
+    Method("LuGre", _fitted(lugre)),
+    Method("Bouc-Wen", _fitted(bouc_wen)),
     Method("Maxwell-slip, NNLS, 15", _maxwell(15)),
     Method("Maxwell-slip, NNLS, 24", _maxwell(24), ("damper",)),
     Method("GMS 1", _fitted(_gms(1))),

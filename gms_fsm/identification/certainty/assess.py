@@ -31,6 +31,7 @@ OPEN = "cannot be told"
 NO_INFLUENCE = "cannot be told: no influence on this record"
 NOT_KNOWN = f"{OPEN}: its interval was not computed"
 AT_BOUND = "at its bound"
+SMOOTHED = "depends on the smoothing of the motion"
 MOST_NAMED = 4  # parameters in one direction
 
 
@@ -185,6 +186,12 @@ def assessed(task: Task, point: Point, pool: ThreadPool) -> Assessed:
         )
         for each, half, opened in zip(entries, halves, sure.open, strict=True)
     )
+    shift = _shift_of_smoothing(task, point, slopes)
+    if shift is not None:
+        table = tuple(
+            _smoothed(each, entry, half, move)
+            for each, entry, half, move in zip(table, entries, halves, shift.tolist(), strict=True)
+        )
     noise = float(np.sqrt(point.cost / max(point.residual.size, 1)))
     words = _in_words(table, entries, noise, task)
     profiles: tuple[Profile, ...] = ()
@@ -196,6 +203,48 @@ def assessed(task: Task, point: Point, pool: ThreadPool) -> Assessed:
         )
     better = None if region is None else region.better
     return Assessed(table, covariance, sure, words, better, profiles)
+
+
+def _shift_of_smoothing(task: Task, point: Point, slopes: FloatArray) -> FloatArray | None:
+    """Return how far each coordinate would move without the smoothing of the motion.
+
+    Half the time constant takes 15/16 of its effect away, which grows with its fourth power.
+    """
+    used = [
+        motion.smoothing
+        for record in task.records
+        if "velocity" not in record.columns
+        and (motion := record.motion(task.options.smoothing)).smoothing > 0.0
+    ]
+    if not used:
+        return None
+    less = replace(task, options=replace(task.options, smoothing=0.5 * min(used)))
+    try:
+        subject = less.fine.reference(less.fine.coordinates.numbers(point.u))
+        parts = []
+        for course in less.fine.courses:
+            _, rest, columns = less.fine.columns(subject, course)
+            parts.append((rest + columns @ point.linear)[course.rows])
+    except LOST:
+        return None
+    change = less.fine.weighted(parts) - point.residual - task.fine.target
+    found: FloatArray = -16.0 / 15.0 * np.linalg.lstsq(slopes, change, rcond=1e-6)[0]
+    return found
+
+
+def _smoothed(each: Estimate, entry: _Entry, half: float, shift: float) -> Estimate:
+    """Return an estimate whose interval covers what the smoothing may have done to it."""
+    if not each.told or abs(shift) <= half:
+        return each
+    if entry.kind == "log":
+        there = each.value * math.exp(min(max(shift, -5.0), 5.0))
+    else:
+        there = each.value + shift * entry.scale
+    width = each.high - each.low
+    low = max(min(each.low, there - 0.5 * width), entry.low)
+    high = min(max(each.high, there + 0.5 * width), entry.high)
+    note = each.note or f"{SMOOTHED}; without it about {there:.3g}"
+    return replace(each, low=low, high=high, note=note)
 
 
 def unassessed(task: Task, point: Point) -> Assessed:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +30,11 @@ class ChoiceRow:
         What its fits took.
     note : str
         Why it failed, if it did.
+    why : str
+        Why it was not chosen.
+    by_amplitude, by_speed : float
+        RMSE when all records of one amplitude, or of one speed, are left out at a time; NaN where
+        the records have only one.
     """
 
     name: str
@@ -38,6 +45,9 @@ class ChoiceRow:
     bic: float
     seconds: float
     note: str = ""
+    why: str = ""
+    by_amplitude: float = math.nan
+    by_speed: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -101,3 +111,28 @@ def score_of(measured: FloatArray, modelled: FloatArray) -> dict[str, float]:
         "r2": 1.0 - float(left @ left) / whole if whole else math.nan,
         "rows": float(measured.size),
     }
+
+
+def lines_of(fit: Any) -> list[str]:
+    """Return a fit as lines: its table, its scores, what cannot be told, how it was chosen."""
+    lines = [f"{'parameter':14s} {'value':>12s}   {'95 % interval':28s} unit"]
+    for each in fit.table:
+        value, interval = each.shown
+        note = f"  {each.note}" if each.note else ""
+        lines.append(f"{each.name:14s} {value:>12s}   {interval:28s} {each.unit}{note}".rstrip())
+    unit = fit.task.measured.unit
+    lines.append(_scored("training", fit.training, unit))
+    if fit.held_out is not None:
+        lines.append(_scored("held out", fit.held_out, unit))
+    lines.append(fit.weakest)
+    if fit.choice is not None:
+        lines.append(f"chosen among {len(fit.choice.rows)} candidates: {fit.choice.chosen}")
+        for row in fit.choice.rows:
+            if row.name != fit.choice.chosen:
+                lines.append(f"{row.name}: {f'failed: {row.note}' if row.note else row.why}")
+    return [*lines, fit.stopped] if fit.stopped else lines
+
+
+def _scored(name: str, score: Mapping[str, float], unit: str) -> str:
+    rows = int(score["rows"])
+    return f"{name}: RMSE {score['rmse']:.4g} {unit}, R2 {score['r2']:.5f} ({rows} rows)"

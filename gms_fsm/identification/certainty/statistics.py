@@ -140,9 +140,7 @@ def certainty(
     return Certainty(covariance, half, opened, vectors, spread, tau, effective)
 
 
-def _of_decaying_noise(
-    slopes: FloatArray, parts: Sequence[FloatArray]
-) -> tuple[FloatArray, float]:
+def _of_decaying_noise(slopes: FloatArray, parts: Sequence[FloatArray]) -> tuple[FloatArray, float]:
     """Return the covariance of least squares under AR(1) noise, and its correlation by row.
 
     The correlation is that of the restricted likelihood of generalised least squares, which knows

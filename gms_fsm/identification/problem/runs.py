@@ -181,6 +181,7 @@ class Course:
         """Return the same course with every n-th row only."""
         if every <= 1:
             return self
+
         def fewer(before: FloatArray) -> FloatArray:
             return before[::-1][every - 1 :: every][::-1]
 
