@@ -20,6 +20,8 @@ from gms_fsm import _neighbours as _neighbours
 from gms_fsm._version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from gms_fsm.analysis.cycles import LimitCycle as LimitCycle
+    from gms_fsm.analysis.cycles import limit_cycle as limit_cycle
     from gms_fsm.charts.chart import Chart as Chart
     from gms_fsm.charts.chart import State as State
     from gms_fsm.charts.chart import Transition as Transition
@@ -103,6 +105,7 @@ if TYPE_CHECKING:
 
 # The same names again, for run time; type checkers read those above. A test keeps the two in step.
 _HOMES = {
+    "analysis.cycles": "LimitCycle limit_cycle",
     "charts.chart": "Chart State Transition",
     "charts.parameters": "Parameter",
     "charts.stribeck": "Stribeck",

@@ -307,7 +307,7 @@ def run(
 
 
 def events(
-    equations: Equations, switch: Switching, b: Buffers, options: LoopOptions
+    equations: Equations, switch: Switching, b: Buffers, options: LoopOptions, solver: Any = None
 ) -> Iterator[Event]:
     """Continue from the state in some buffers; see `run`.
 
@@ -320,6 +320,8 @@ def events(
         As in `run`.
     b : Buffers
         From `buffers`, possibly with a restored state.
+    solver : object, optional
+        What takes the steps of a plan that is foreign; SciPy's solver of the options if omitted.
 
     Yields
     ------
@@ -328,8 +330,7 @@ def events(
     """
     functions = equations.functions(options.located)
     on = Held(functions, b.now.held, b.sliding)
-    solver = None
-    if b.plan.foreign:
+    if b.plan.foreign and solver is None:
         from integrators.runners.scipy_arcs import SciPyStepper
 
         solver = SciPyStepper(on, b, options)

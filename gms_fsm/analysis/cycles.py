@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Unpack
@@ -166,7 +167,7 @@ class _Search:
     """Newton's method for the state at the start, and for the period if nothing drives the system.
 
     A system may be driven only in that it moves along with what drives it, as a mass that is pulled
-    at constant speed: then `drift` is the velocity of that motion, and the state returns but for it.
+    at constant speed: `drift` is the velocity of that motion, and the state returns but for it.
     """
 
     what: Mounted
@@ -218,7 +219,7 @@ class _Search:
         for iteration in range(1, MOST_ITERATIONS + 1):
             start = self.problem(y, period)
             trace = simulated(start)
-            M = derived(start, every).followed.end
+            M = derived(start, every, trace).followed.end
             end = np.array(trace.rows.y[-1])
             moved = np.zeros(size) if drift is None else drift * period
             R = Q.T @ ((end - y - moved) / self.sizes)
@@ -266,10 +267,11 @@ def _newton(A: FloatArray, R: FloatArray, along: FloatArray | None) -> tuple[Flo
     """Return the step of the state, across the motion, and of the period."""
     eye = np.eye(len(R))
     if along is None:
-        return np.linalg.lstsq(A - eye, -R, rcond=None)[0], 0.0
+        found: FloatArray = np.linalg.lstsq(A - eye, -R, rcond=None)[0]
+        return found, 0.0
     size = float(np.linalg.norm(along)) or 1.0
     matrix = np.block([[A - eye, along[:, None] / size], [along[None, :] / size, np.zeros((1, 1))]])
-    step = np.linalg.lstsq(matrix, np.append(-R, 0.0), rcond=None)[0]
+    step = np.asarray(np.linalg.lstsq(matrix, np.append(-R, 0.0), rcond=None)[0], dtype=np.float64)
     return step[:-1], float(step[-1]) / size
 
 
@@ -301,10 +303,8 @@ def _dependence(trace: Trace) -> tuple[FloatArray, FloatArray | None]:
         mode = tuple(rows.mode[row].tolist())
         held = armed(program, t, y, mode)
         tables = [linear.flow(t, y, mode, held, time, seed)[1]]
-        try:
+        with contextlib.suppress(ArithmeticError):  # a comparison that is not defined here
             tables.append(linear.margins(relations, t, y, mode, held, time, seed)[1])
-        except ArithmeticError:  # a comparison that is not defined in this state
-            pass
         for table in tables:
             lengths = np.linalg.norm(table, axis=1)
             table = table[np.isfinite(lengths) & (lengths > 0.0)]

@@ -69,7 +69,7 @@ class Arcs:
         if self._machine_code is None or slides:
             if slides:
                 arguments = arguments._replace(flow=self._along(mode))
-            lists = (u.tolist() if isinstance(u, np.ndarray) else u for u in arguments)
+            lists: Any = (u.tolist() if isinstance(u, np.ndarray) else u for u in arguments)
             arguments = VaryArguments(*lists)
             vary(*arguments, directions, len(t))
             table[:] = arguments.table

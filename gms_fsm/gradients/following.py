@@ -25,11 +25,15 @@ from gms_fsm.gradients.arcs import Arcs
 from gms_fsm.gradients.linear import Directions, Linear
 from gms_fsm.language import comparisons, split
 from gms_fsm.lowering.program import Program, equations
-from integrators import Arc, Firing, LoopOptions, Slide, Stop, hybrid
-from integrators.advance import CROSSED
+from integrators import Arc, Firing, Held, LoopOptions, Slide, Stop, hybrid
+from integrators.advance import CROSSED, REACHED, raise_floor
+from integrators.crossings import any_changed, listed
+from integrators.sliding import margins_on
+from integrators.steps import time_of
 
 Modes = tuple[int, ...]
 ALIKE = 1e-7  # times of switches that differ by less have one derivative
+ROUNDING = 1e-12  # of the length of a run
 GRAZING = 1e-5  # of the mean rate of a margin over its last step
 
 
@@ -123,6 +127,24 @@ class _Crossing:
     held: list[float]
 
 
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A run as it was recorded.
+
+    Parameters
+    ----------
+    times, states : list of float, and ndarray
+        Its rows.
+    stop_times, stop_states : list of float, and ndarray
+        Both sides of all its stops.
+    """
+
+    times: list[float]
+    states: FloatArray
+    stop_times: list[float]
+    stop_states: FloatArray
+
+
 class Follower:
     """Follows one run.
 
@@ -136,6 +158,8 @@ class Follower:
         Time, state and modes at the start, and the last time.
     directions : Directions
         Those of the tangents.
+    recorded : Recorded, optional
+        What machine code has recorded of the run: the loop then goes from stop to stop.
     """
 
     def __init__(
@@ -144,6 +168,7 @@ class Follower:
         options: LoopOptions,
         start: tuple[float, list[float], list[int], float],
         directions: Directions,
+        recorded: Recorded | None = None,
     ) -> None:
         self.program, self.directions = program, directions
         self.linear = Linear(program, directions)
@@ -153,8 +178,14 @@ class Follower:
         self.start = t, y, mode
         made = equations(program)
         self.switch = _Recording(program.ieee)
-        self.buffers = hybrid.buffers(made, t, y, mode, self.last, self.options)
-        self.events = hybrid.events(made, self.switch, self.buffers, self.options)
+        b = hybrid.buffers(made, t, y, mode, self.last, self.options)
+        self.recorded = recorded
+        if recorded is not None:
+            b = b._replace(plan=b.plan._replace(foreign=True))
+        self.buffers = b
+        solver = None if recorded is None else self
+        self.on = Held(made.functions(True), b.now.held, b.sliding)
+        self.events = hybrid.events(made, self.switch, b, self.options, solver)
         self.t, self.y = t, list(y)
         self.mode: Modes = program.layout.not_sliding(mode)
         self.S = directions.y.copy()
@@ -211,12 +242,34 @@ class Follower:
             first += 1
         if first == len(times):
             return
+        self.begin(mode)
+        self.integrate(times[first:], states[first:])
+
+    def begin(self, mode: Modes) -> None:
+        """Begin an arc, if one does."""
         if self.at_instant:
             self.mode = mode
             held = list(self.buffers.now.held)
             self.settle(held)
             self.arc = mode, held
-        self.integrate(times[first:], states[first:])
+
+    def advance(self, _: int) -> None:
+        """Go to the end of an arc as it was recorded, in place of a solver."""
+        b, recorded = self.buffers, self.recorded
+        assert recorded is not None
+        now = b.now
+        end = bisect_right(recorded.stop_times, self.t)
+        t, y = recorded.stop_times[end], recorded.stop_states[end].tolist()
+        first, last = bisect_right(recorded.times, self.t), bisect_left(recorded.times, t)
+        self.begin(hybrid.modes_of(b))
+        times, states = recorded.times[first:last], recorded.states[first:last].tolist()
+        self.integrate([*times, t], [*states, y])
+        now.t = t
+        now.y[:] = y
+        w = listed(b.relations, b.memory.active)
+        margins_on(time_of(now), now.y, now.mode, self.on, w.watch, w.search.probe)
+        b.memory.status = CROSSED if any_changed(w, w.search.probe) else REACHED
+        raise_floor(b.plan.control, now)
 
     def keep(self, t: float, S: FloatArray) -> None:
         """Keep a row."""
@@ -226,8 +279,6 @@ class Follower:
     def stop(self, event: Stop) -> None:
         """Note the end of an arc, or either side of a jump."""
         b = self.buffers
-        if event.t > self.t:  # an arc without a row of its end
-            self.rows_of([event.t], [event.y], event.mode)
         if not self.at_instant and self.arc is not None:
             self.switch.done.clear()
             if b.memory.status == CROSSED and event.t >= b.now.t:
@@ -238,15 +289,13 @@ class Follower:
                     self.crossing = _Crossing(changed, self.t, list(self.y), mode, held)
         self.at_instant = True
         self.y, self.mode = list(event.y), event.mode
-        if event.t > self.t:
-            self.t = event.t
+        self.t = max(self.t, event.t)  # a jump is one clock tick later
 
     # ------------------------------------------------------------------ arcs
     def integrate(self, times: list[float], states: list[list[float]]) -> None:
         """Integrate the tangents along rows of an arc, and keep what is wanted."""
         assert self.arc is not None
         wanted, end = self.wanted, times[-1]
-        nodes: dict[float, list[float] | None] = {self.t: self.y}
         kept = times if wanted is None else []
         if wanted is not None:
             while self.taken < len(wanted) and wanted[self.taken] < end:
@@ -254,8 +303,8 @@ class Follower:
                 self.taken += 1
         knots = self.program.knots
         between = knots[bisect_right(knots, self.t) : bisect_left(knots, end)]
-        nodes |= dict.fromkeys([*kept, *between])
-        nodes |= zip(times, states, strict=True)
+        nodes: dict[float, list[float] | None] = dict.fromkeys([*kept, *between])
+        nodes |= {self.t: self.y, **dict(zip(times, states, strict=True))}
         t = sorted(nodes)
         self.size = np.maximum(self.size, np.abs(np.array([self.y, *states])).max(axis=0))
         table = self.arcs.integrate(*self.arc, t, [nodes[u] for u in t], self.S, self.size)
@@ -399,15 +448,21 @@ class Follower:
                 for t, y in ((t0, y0), (c.t, c.y))
             )
             mean = np.abs(end - start) / (c.t - t0)
-            if (np.abs(rates) < GRAZING * mean).any():
-                self.doubts.append(
-                    DerivativeDoubt(
-                        "grazing", c.t, names[0], "it only touches: no derivative from here on"
-                    )
-                )
+            slow = np.abs(rates) < GRAZING * mean
+            if slow.any():
+                name = names[int(np.argmax(slow))]
+                why = "grazes" if rates[slow].any() else "jumps"
+                reason = f"it {why} there, so that nothing has a derivative from then on"
+                self.doubts.append(DerivativeDoubt("grazing", c.t, name, reason))
                 t_t[:] = np.nan
         apart = np.ptp(t_t, axis=0) if len(t_t) else np.zeros(0)
-        if (apart > ALIKE * np.max(np.abs(t_t), axis=0)).any():
+        least = ROUNDING * (self.last - self.start[0]) / self.directions.scales
+        if (apart > ALIKE * np.max(np.abs(t_t), axis=0) + least).any():
             self.doubts.append(
-                DerivativeDoubt("tie", c.t, " and ".join(dict.fromkeys(names)), "one-sided")
+                DerivativeDoubt(
+                    "tie",
+                    c.t,
+                    " and ".join(dict.fromkeys(names)),
+                    "they hold on the side on which these follow each other as they did",
+                )
             )

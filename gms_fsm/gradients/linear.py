@@ -167,7 +167,14 @@ class Linear:
         return self.call("flow", arguments, t_t, y_t, len(y), p_t)
 
     def along(
-        self, t: float, y: list[float], mode: Modes, held: list[float], t_t: FloatArray, y_t: Any
+        self,
+        t: float,
+        y: list[float],
+        mode: Modes,
+        held: list[float],
+        t_t: FloatArray,
+        y_t: Any,
+        p_t: list[Any] | None = None,
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the slope along surfaces, as `integrators.sliding` has it, and the sigmas."""
         program, modes, signs = self.program, list(mode), list(held)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.arguments import unknown
-from gms_fsm.gradients.following import Followed, Follower
+from gms_fsm.gradients.following import Followed, Follower, Recorded
 from gms_fsm.gradients.linear import Directions, Linear
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.program import Program
@@ -22,13 +22,16 @@ class Table(Protocol):
     """The rows of a run."""
 
     @property
-    def t(self) -> FloatArray: ...
+    def t(self) -> FloatArray:
+        """Times, s."""
 
     @property
-    def y(self) -> FloatArray: ...
+    def y(self) -> FloatArray:
+        """States, shape (rows, m)."""
 
     @property
-    def mode(self) -> NDArray[np.int64]: ...
+    def mode(self) -> NDArray[np.int64]:
+        """Modes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +56,10 @@ class Sensitivities:
         options: LoopOptions,
         start: tuple[float, list[float], list[int], float],
         directions: Directions,
+        recorded: Recorded | None = None,
     ) -> Sensitivities:
         """Differentiate a run."""
-        return cls(directions, Follower(program, options, start, directions).follow())
+        return cls(directions, Follower(program, options, start, directions, recorded).follow())
 
     def column(self, to: str) -> int:
         """Return the place of a direction."""

@@ -72,9 +72,7 @@ def tangents(program: Program, active: Places) -> Mapping[str, Any]:
 
 
 @functools.lru_cache(maxsize=64)
-def _made(
-    _: ByIdentity[Any], source: str, title: str, active: Places
-) -> Mapping[str, Any]:
+def _made(_: ByIdentity[Any], source: str, title: str, active: Places) -> Mapping[str, Any]:
     text = with_tangents(source, active)
     namespace = load(title, text, SIGNALS)
     return {name: namespace[name] for name in FUNCTIONS} | {"text": text}

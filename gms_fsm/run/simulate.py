@@ -7,10 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
 
+import numpy as np
+
 import integrators
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.foundation.arguments import checked_path, refusing
 from gms_fsm.gradients.directions import directions_of
+from gms_fsm.gradients.following import Recorded
 from gms_fsm.gradients.linear import Directions
 from gms_fsm.gradients.sensitivities import Sensitivities
 from gms_fsm.lowering.program import equations
@@ -199,7 +202,7 @@ def simulate(
         keeper.finish()
     trace = seen.trace()
     if sensitivities:
-        trace = replace(trace, derived=derived(start, wanted))
+        trace = replace(trace, derived=derived(start, wanted, trace))
     return watched(trace, watching) if watching else trace
 
 
@@ -211,13 +214,20 @@ def simulated(start: Problem) -> Trace:
     return run.recorder.trace()
 
 
-def derived(start: Problem, directions: Directions) -> Sensitivities:
+def derived(start: Problem, directions: Directions, trace: Trace) -> Sensitivities:
     """Return the derivatives of a run that has reached its end."""
     options = start.options
     if start.output == "end":
         options = replace(options, times=[start.last])
     begin = start.t_start, start.y, start.mode, start.last
-    return Sensitivities.of(start.program, options, begin, directions)
+    recorded = None
+    if start.chosen.engine == "compiled":  # once more, for its stops
+        ends = replace(start.chosen, output="t_eval", t_eval=[start.last])
+        once = replace(start, chosen=ends, options=replace(start.options, times=[start.last]))
+        stops = trace.stops if start.output == "t_eval" else simulated(once).stops
+        rows = trace.rows if start.output == "all" else stops
+        recorded = Recorded(rows.t.tolist(), np.asarray(rows.y), stops.t.tolist(), stops.y)
+    return Sensitivities.of(start.program, options, begin, directions, recorded)
 
 
 def check_derivable(chosen: Settings, until: str | None = None) -> None:

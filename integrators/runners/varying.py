@@ -44,16 +44,16 @@ class VaryArguments(NamedTuple):
     method: Coefficients
     flow: Callable[..., Any]  # flow(t, y, mode, held, p, dy, dt, y_t, p_t, dy_t)
     p: Any
-    moves: list[Vector]  # what the numbers change by in each direction: shared, then own ones
-    held: Vector
-    mode: list[int]
-    t: Vector  # the nodes, increasing
-    known: list[int]  # whether the state at a node is given
-    y: list[Vector]  # the state there
-    table: list[Vector]  # the tangents at the nodes, m numbers for each direction
-    sizes: Vector  # the largest value of each component
-    scales: Vector  # how much the numbers of each direction change at most
-    tolerance: Vector  # the relative one, then the absolute ones
+    moves: Any  # what the numbers change by in each direction: shared, then own ones
+    held: Any
+    mode: Any
+    t: Any  # the nodes, increasing
+    known: Any  # whether the state at a node is given
+    y: Any  # the state there
+    table: Any  # the tangents at the nodes, m numbers for each direction
+    sizes: Any  # the largest value of each component
+    scales: Any  # how much the numbers of each direction change at most
+    tolerance: Any  # the relative one, then the absolute ones
     work: Work
 
 
@@ -67,8 +67,8 @@ def work(size: int, own: int, longest: int, shared: int, stages: int) -> Work:
         return [vector() for _ in range(stages + 1)]
 
     rows = [[0.0] * longest for _ in range(own)]
-    vectors = (vector() for _ in range(6))
-    return Work(slopes(), slopes(), *vectors, own=rows, shared=[0.0] * shared)
+    a, b, c, d, e, f = (vector() for _ in range(6))
+    return Work(slopes(), slopes(), a, b, c, d, e, f, rows, [0.0] * shared)
 
 
 def vary(
