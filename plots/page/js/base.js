@@ -3,7 +3,17 @@
 let data = JSON.parse(document.getElementById("data").textContent); // a host may send other data later
 const $ = (query, root = document) => root.querySelector(query);
 const $$ = (query, root = document) => [...root.querySelectorAll(query)];
-const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+// A colour of the style sheet. To ask for one may compute all styles anew: each is asked for once a picture.
+let colours = null;
+function colour(name) {
+  if (!colours) {
+    colours = new Map();
+    setTimeout(() => { colours = null; });
+  }
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return colours.get(name);
+}
 
 function make(tag, parent, text = "", attributes = {}) {
   const node = document.createElement(tag);

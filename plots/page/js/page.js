@@ -17,12 +17,12 @@ function show(k, words = "") {
   if (t < span.min || t > span.max) zoomTo(t - half, t + half); // a zoomed window follows
   for (const view of views) view.show(frames.rows[view.place][frame]);
   const place = `t = ${timeText(t, 9)}`;
-  $("#now").textContent = place;
+  say($("#now"), place);
   const scrubber = $("#scrubber");
   scrubber.value = inTime ? t : frame;
   const verdicts = views.map((view) => (views.length > 1 ? `run ${view.place + 1}: ` : "") + view.verdict());
   if (!play.on) scrubber.setAttribute("aria-valuetext", `${place}, ${runs[0].rowName(frames.rows[0][frame])}`);
-  $("#say").textContent = words && views.length > 1 ? words : [words, ...verdicts].filter(Boolean).join("; ");
+  say($("#say"), words && views.length > 1 ? words : [words, ...verdicts].filter(Boolean).join("; "));
   $("#say").classList.toggle("fired", views.some((view) => view.happened().length));
   tell();
   tellNotes();
@@ -277,7 +277,7 @@ function measure() {
     if (!(contact?.n > element && contact.edges[edge])) breakpoints.delete(key);
     else breakpoints.set(key, { ...point, place, name, element, edge, frames: framesOf(place, contact, element, edge) });
   }
-  $("#facts").textContent = runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" ");
+  say($("#facts"), runs.map((run) => `${run.title}: ${run.of} rows, ${run.rows} on this page; ${run.log.length} transitions.`).join(" "));
 }
 
 // Shows other data in the place of those shown, if any; selection and open tabs stay.

@@ -87,7 +87,7 @@ class TimePlots {
 
   // The runs have other rows. Where values need another unit, the plots are made anew.
   renew() {
-    if (this.plots.some(({ lines, unit, power }) => powerFor(lines, unit) !== power)) {
+    if (!sketching && this.plots.some(({ lines, unit, power }) => powerFor(lines, unit) !== power)) {
       this.close();
       this.fill();
       this.fit();
@@ -95,8 +95,9 @@ class TimePlots {
     }
     zooming = true; // of its own accord
     this.sketch(sketching);
+    const columns = sketching ? columnsOf(this.width()) : null, t = columns ? Float64Array.from(columns.ends, (k) => frames.t[k]) : frames.t;
     for (const { plot, lines } of this.plots) {
-      plot.setData([frames.t, ...lines.map(alongFrames)], false);
+      plot.setData([t, ...lines.map((line) => (columns ? alongColumns(line, columns) : alongFrames(line)))], false);
       plot.setScale("x", { ...span });
     }
     zooming = false;
@@ -104,7 +105,7 @@ class TimePlots {
     return true;
   }
 
-  // Lines as thin as they can be, and solid: these take half the time. Then as they should be again.
+  // Lines as thin as they can be, solid, and with the extremes of each column of pixels only. Then as they should be again.
   sketch(on) {
     if (Boolean(this.sketched) === on) return;
     this.sketched = on;
@@ -113,7 +114,6 @@ class TimePlots {
         if (on) Object.assign(each, { fine: { width: each.width, dash: each.dash } }, { width: 1, dash: [] });
         else Object.assign(each, each.fine);
       }
-      if (!on) plot.redraw(false, false);
     }
   }
 
@@ -170,19 +170,25 @@ class TimePlots {
   drawRibbons() {
     const wide = span.max - span.min;
     for (const { contact, i, track } of this.tracks) {
-      const { run } = contact, pieces = contact.pieces[i];
-      track.replaceChildren();
+      $(".note", track)?.remove();
+      const { run } = contact, pieces = contact.pieces[i], nodes = [...track.children];
+      let count = 0;
       for (let k = 0, to = 0; k < pieces.length; k++) {
         const from = Math.max(k ? run.t(pieces[k].from) : -Infinity, span.min);
         to = k + 1 < pieces.length ? run.t(pieces[k + 1].from) : run.t(run.rows - 1);
         const width = (Math.min(to, span.max) - from) / wide;
         if (!(width > 5e-4)) continue;
-        const piece = make("i", track, "", { class: `state${pieces[k].mode % STATES}` });
-        piece.style.left = `${(100 * (from - span.min)) / wide}%`;
-        piece.style.width = `${100 * width}%`;
+        const piece = nodes[count] ?? make("i", track), look = [pieces[k].mode, (100 * (from - span.min)) / wide, 100 * width].join();
+        count += 1;
+        if (piece.look === look) continue; // as before
+        piece.look = look;
+        piece.className = `state${pieces[k].mode % STATES}`;
+        [piece.style.left, piece.style.width] = look.split(",").slice(1).map((u) => `${u}%`);
+        piece.replaceChildren();
         if (width > 0.06) make("span", piece, contact.states[pieces[k].mode]);
       }
-      if (!track.children.length) make("span", track, "changes too often to be seen: zoom in", { class: "note" });
+      for (const node of nodes.slice(count)) node.remove();
+      if (!count) make("span", track, "changes too often to be seen: zoom in", { class: "note" });
     }
   }
 
@@ -212,6 +218,38 @@ function alongFrames({ get, run }) {
     if (k > 0 && rows[k] === rows[k - 1]) continue;
     const u = get(rows[k]);
     found[k] = Number.isFinite(u) ? u : null;
+  }
+  return found;
+}
+
+// The frames of each column of pixels, as the first of each and the end of the last; null if no column has more than two.
+function columnsOf(width) {
+  const { t } = frames, from = [], ends = [], wide = (span.max - span.min) / width;
+  for (let k = 0, column = NaN; k < t.length; k++) {
+    const now = Math.floor(clamp(t[k] - span.min, -wide, span.max - span.min + wide) / wide);
+    if (now === column) continue;
+    if (k) ends.push(from.at(-1), k - 1);
+    from.push(k);
+    column = now;
+  }
+  ends.push(from.at(-1), t.length - 1);
+  return 2 * from.length < t.length ? { from: [...from, t.length], ends } : null;
+}
+
+// The extremes of a line in each column of pixels, in their order: it looks as the whole line does.
+function alongColumns({ get, run }, { from }) {
+  const rows = frames.rows[run.place], found = new Array(2 * from.length - 2);
+  for (let c = 0; c + 1 < from.length; c++) {
+    let low = Infinity, high = -Infinity, rises = true, gap = false;
+    for (let k = from[c]; k < from[c + 1]; k++) {
+      if (k > 0 && rows[k] === rows[k - 1]) continue;
+      const u = get(rows[k]);
+      if (!Number.isFinite(u)) { gap = true; continue; }
+      if (u < low) { low = u; rises = false; }
+      if (u > high) { high = u; rises = true; }
+    }
+    if (low > high) found[2 * c] = found[2 * c + 1] = gap ? null : undefined;
+    else [found[2 * c], found[2 * c + 1]] = rises ? [low, high] : [high, low];
   }
   return found;
 }
@@ -282,7 +320,10 @@ class TimePane extends TimePlots {
     const { contact } = this.view, [name] = contact.variables;
     if (!name) return false;
     const over = contact.threshold && contact.columns.s;
-    const get = (of, i) => (over ? (row) => of.value(name, i, row) / of.value("s", i, row) : (row) => of.value(name, i, row));
+    const get = (of, i) => {
+      const [z, s] = [name, "s"].map((each) => [of.columns[each]].flat()[i] ?? ((row) => of.value(each, i, row)));
+      return over ? (row) => z(row) / s(row) : z;
+    };
     const lines = this.contacts.flatMap((of) => of.modes.map((_, i) => ({
       get: get(of, i), run: of.run, of, i, ...(shownRuns().length > 1 || of.run.ghost ? RUNS[of.run.place] : { stroke: `--e${elementStep(i, of.n)}`, dash: DASHES[i % DASHES.length] }),
     })));

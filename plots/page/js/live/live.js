@@ -131,7 +131,7 @@ function settle() {
   settling = setTimeout(() => {
     $("#say").setAttribute("aria-live", "polite");
     sketching = false;
-    eachPlots((pane) => pane.sketch(false));
+    eachPlots((pane) => { if (pane.sketched) pane.renew(); });
     writeAddress();
   }, SETTLED);
 }

@@ -34,7 +34,7 @@ class Dial {
   }
 
   // Another box for the number, in a guard.
-  link(box) { this.linked = [...(this.linked ?? []).filter((each) => each.isConnected), box]; this.show(); }
+  link(box) { this.linked = [...(this.linked ?? []).filter((each) => each.isConnected), box]; this.renewed = true; this.show(); }
 
   limits() { return this.rule.map(([op, limit]) => `${IN_WORDS[op]} ${limit}`); }
 
@@ -55,12 +55,15 @@ class Dial {
 
   // The value, where the slider has it and the box names it.
   show() {
-    const { value: u, low, high, log, unit } = this, part = log ? Math.log(u / low) / Math.log(high / low) : (u - low) / (high - low);
+    const { value: u, low, high, log, unit } = this;
+    if (Object.is(this.told, u) && this.box.value === this.text && !this.renewed) return;
+    const part = log ? Math.log(u / low) / Math.log(high / low) : (u - low) / (high - low);
     this.range.value = Math.round(SLIDER_STEPS * clamp(Number.isNaN(part) ? 0 : part, 0, 1));
     this.range.setAttribute("aria-valuetext", eng(u, unit === "1" ? "" : unit, 4));
     if (document.activeElement !== this.box || this.box.getAttribute("aria-invalid") !== "true") this.box.value = Number.isNaN(u) ? "" : exactly(u);
     for (const box of this.linked ?? []) box.value = exactly(u);
     this.root.classList.toggle("changed", u !== this.given.value);
+    Object.assign(this, { told: u, text: this.box.value, renewed: false });
   }
 }
 

@@ -133,11 +133,11 @@ class RunView {
     if (fired && following) this.choose(fired.contact, fired.element);
     const { contact } = this;
     const ended = run.ended(frames.t[frame]) && `ended at ${timeText(run.t(row), 5)}`;
-    $(".values", this.root).textContent = [
+    say($(".values", this.root), [
       ...contact.shown.map((name) => `${name === contact.velocity ? "v" : name} = ${contact.tell(name, contact.value(name, 0, row), 5)}`),
       run.rowName(row) + (run.between[row] ? "" : ` of ${run.of}`),
       ended || (run.between[row] ? "" : `micro-step ${run.microstep[row]}`),
-    ].filter(Boolean).join("   ");
+    ].filter(Boolean).join("   "));
     this.showTokens();
     this.explain();
     for (const pane of this.live) pane.show();
@@ -231,8 +231,8 @@ class RunView {
     if (this.explained === key) return;
     this.explained = key;
     const state = contact.modes[element][row], scope = contact.scope(element, row);
-    $(".who", this.root).textContent = `Guards of ${nameOf(contact, element)}`;
-    $(".fact", this.root).textContent = `in ${contact.states[contact.modes[element][this.row]]}${fired < 0 ? "" : `, when checked in ${contact.states[state]}`}`;
+    say($(".who", this.root), `Guards of ${nameOf(contact, element)}`);
+    say($(".fact", this.root), `in ${contact.states[contact.modes[element][this.row]]}${fired < 0 ? "" : `, when checked in ${contact.states[state]}`}`);
     contact.edges.forEach((edge, k) => contact.clauses(k, scope).forEach((clause, c) => {
       const { line, button, word, sides, truth } = this.lines[k][c], asked = edge.source === state;
       line.classList.toggle("asked", asked);
@@ -240,12 +240,12 @@ class RunView {
       if (button) {
         const on = breakpoints.has(keyOf(this, contact, element, k));
         button.setAttribute("aria-pressed", on);
-        button.textContent = on ? "●" : "○";
-        word.textContent = k === fired ? "FIRED" : asked ? "" : "not checked";
+        say(button, on ? "●" : "○");
+        say(word, k === fired ? "FIRED" : asked ? "" : "not checked");
       }
       const texts = [marginText(clause), inClause(clause, clause.left), inClause(clause, clause.right)];
-      sides.forEach((cell, i) => { cell.textContent = edge.clauses[c].compares ? texts[i] : ""; });
-      truth.textContent = { 1: "✓ true", 0: "✗ false" }[clause.truth] ?? "? unknown";
+      sides.forEach((cell, i) => say(cell, edge.clauses[c].compares ? texts[i] : ""));
+      say(truth, { 1: "✓ true", 0: "✗ false" }[clause.truth] ?? "? unknown");
       truth.className = clause.truth === 1 ? "true" : "";
     }));
     const asked = [contact.name, element, state, fired].join();
@@ -346,17 +346,19 @@ class ChartPane {
   elementIn(slot) { return this.parts.length === this.view.contact.n ? slot : this.view.element; }
 
   show() {
-    for (let slot = 0; slot < this.parts.length; slot++) this.light(slot);
-    if (this.scrolls) for (const node of $$(".state.active, .guard.fired", this.region ?? this.box)) reveal(node, this.box);
+    for (let slot = 0; slot < this.parts.length; slot++) if (this.light(slot)) this.moved = true;
+    if (this.moved && this.scrolls) for (const node of $$(".state.active, .guard.fired", this.region ?? this.box)) reveal(node, this.box);
+    this.moved = false;
   }
 
+  // Whether it looks different from before.
   light(slot) {
     const { view } = this, { contact } = view, element = this.elementIn(slot), { fired, row } = contact.asked(element, view.row);
     const active = contact.modes[element][view.row], asked = contact.modes[element][row], scope = contact.scope(element, row);
     const truths = contact.edges.map((edge) => edge.clauses.map(({ holds }) => truthOf(holds, scope)));
     const stops = contact.edges.map((_, k) => breakpoints.has(keyOf(view, contact, element, k)));
     const differs = view.differs(element), look = [element, active, fired, truths, stops, view.element, differs].join();
-    if (this.looks[slot] === look) return; // most elements look the same as on the previous row
+    if (this.looks[slot] === look) return false; // most elements look the same as on the previous row
     this.looks[slot] = look;
     for (const node of this.parts[slot]) {
       const { state, edge } = node.dataset, on = (name, yes) => node.classList.toggle(name, yes);
@@ -383,6 +385,7 @@ class ChartPane {
         }
       }
     }
+    return true;
   }
 
   renew() { return true; } // it shows a row, as always
@@ -403,6 +406,7 @@ class ChartPane {
     this.svg.setAttribute("viewBox", shown);
     const [, , w, h] = shown.split(" ").map(Number), scale = clamp(Math.min(across / w, high / h), this.region ? least : enough, LARGEST);
     place(this.svg, { width: w * scale, height: h * scale });
+    this.moved = true;
     this.scrolls = w * scale > across + 1 || (isWide() && h * scale > high + 1);
   }
 }
