@@ -268,7 +268,7 @@ def summary_text(loaded: Loaded, trace: Trace, trust: Trust) -> str:
         lines += [
             f"- system: {plain(trace.system.name)}",
             *(
-                [f"- numbers: {named_numbers(trace.system.numbers)}"]
+                [f"- numbers: {named_numbers(trace.system.numbers, trace.system.units)}"]
                 if trace.system.numbers
                 else []
             ),
@@ -391,6 +391,7 @@ def _parameters(trace: Trace) -> str:
     shown = []
     for each, value in numbers:
         unit = adapted(each, chart).unit
+        unit = "" if unit == "1" else unit
         unit = per.get(unit, unit) if each in STRIBECK else unit
         shown.append(f"{each.name} = {_number(value)} {unit}".rstrip())
     return ", ".join(shown)

@@ -429,9 +429,12 @@ def _shifted(value: float, power: int) -> float:
     return value * 10.0**power if power >= 0 else value / 10.0**-power
 
 
-def named_numbers(values: Mapping[str, float]) -> str:
-    """Return numbers by name: ``z = 0.1, s = 0.2``."""
-    return ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+def named_numbers(values: Mapping[str, float], units: Mapping[str, str] | None = None) -> str:
+    """Return numbers by name, with units where these are known: ``z = 0.1 m, s = 0.2``."""
+    known = {} if units is None else units
+    return ", ".join(
+        f"{name} = {value:.6g} {known.get(name, '')}".rstrip() for name, value in values.items()
+    )
 
 
 def sparkline(values: Sequence[float | None]) -> str:

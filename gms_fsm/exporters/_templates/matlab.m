@@ -3,7 +3,7 @@ function [s, F] = @(s, v0, v1, dt{arguments})
 %
 %   s = @() is the friction at its beginning.
 %   [s, F] = @(s, v0, v1, dt{arguments}) advances it by dt [s], while its velocity
-%   goes from v0 to v1 [m/s] on a straight line, and gives the force at the end [N].
+%   goes from v0 to v1 [{length}/s] on a straight line, and gives the force at the end [{force}].
 %   If v0 is not the last v1, the velocity jumps.{inputs}
 %
 %   s.log has a row for every switch: time [s], element, edge; s.edges has their names.

@@ -205,6 +205,8 @@ class FunctionFile:
         template = (TEMPLATES / "matlab.m").read_text(encoding="utf-8")
         main = template.format(
             arguments=further,
+            length=element.length,
+            force=element.force,
             title=FORMS.clean(element.title),
             inputs=about,
             lines=", ".join(f"'{name}', [{name}0, {name}1]" for name in inputs),
