@@ -133,7 +133,9 @@ def run_to_event(
             if plan.lasting > 0:
                 switch.tick(plan.lasting, now.t, now.y, now.mode, p)
             left = _ask(switch, now, memory, sliding, p)
-            if left >= 0:  # an edge of the other mode is enabled: go there first
+            if (
+                len(sliding.surfaces.rise) > 0 and left >= 0
+            ):  # an edge of the other mode is enabled: go there first
                 leave(on, now, relations, left)
                 return SLID
             _only_due(plan, memory)
@@ -228,25 +230,27 @@ def _ask(switch: Switching, now: Now, memory: Memory, sliding: Sliding, p: Any) 
     for i in surfaces.machine:
         if i >= 0:
             edges[i] = -1
-    for c in range(sliding.count):
-        i = surfaces.machine[which[c]]
-        if i >= 0:
-            edges[i] = own_edge(surfaces, which[c], mode[i])
+    if len(surfaces.rise) > 0:
+        for c in range(sliding.count):
+            i = surfaces.machine[which[c]]
+            if i >= 0:
+                edges[i] = own_edge(surfaces, which[c], mode[i])
     switch.ask(t, y, mode, p, memory.jolt, edges)
     left = -1
-    for c in range(sliding.count):
-        k = which[c]
-        i = surfaces.machine[k]
-        if i >= 0 and edges[i] < 0:
-            kept = mode[i]
-            mode[i] = other_mode(surfaces, k, kept)
-            for j in range(len(edges)):
-                sliding.edges[j] = -1
-            sliding.edges[i] = own_edge(surfaces, k, mode[i])
-            switch.ask(t, y, mode, p, memory.jolt, sliding.edges)
-            mode[i] = kept
-            if sliding.edges[i] >= 0:
-                left = k
+    if len(surfaces.rise) > 0:
+        for c in range(sliding.count):
+            k = which[c]
+            i = surfaces.machine[k]
+            if i >= 0 and edges[i] < 0:
+                kept = mode[i]
+                mode[i] = other_mode(surfaces, k, kept)
+                for j in range(len(edges)):
+                    sliding.edges[j] = -1
+                sliding.edges[i] = own_edge(surfaces, k, mode[i])
+                switch.ask(t, y, mode, p, memory.jolt, sliding.edges)
+                mode[i] = kept
+                if sliding.edges[i] >= 0:
+                    left = k
     return left
 
 
@@ -349,7 +353,7 @@ def _rearm(plan: RunPlan, on: Held, now: Now, relations: Watched, memory: Memory
         slid = seize(on, now, w)
         functions.follow(t, y, mode, held, p)
         count = sliding.count
-        if count > 1 and entangled(on, t, y, mode):
+        if len(surfaces.rise) > 0 and count > 1 and entangled(on, t, y, mode):
             memory.phase, memory.status = AFTER, ENTANGLED
             return NOTHING
         if count > 0:

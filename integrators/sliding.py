@@ -68,9 +68,11 @@ class Surfaces(NamedTuple):
     sign: list[int]  # the index of each one's sign among the held signs, shape (S,)
     above: list[int]  # its relation u > 0, shape (S,)
     at_least: list[int]  # its relation u >= 0, shape (S,)
-    # Of each one between two modes, shape (S,); the relations are those of the two edges, and u is
-    # the margin of the first.
-    machine: list[int]  # its machine; -1 where a sign changes
+    # Of each one between two modes; the relations are those of the two edges, and u is the margin
+    # of the first.
+    machine: list[int]  # its machine; -1 where a sign changes, shape (S,)
+    # The others are empty if there are none of a machine: machine code is then translated without
+    # what follows from them, since lengths are known while translating.
     upper: list[int]  # the mode where u > 0
     lower: list[int]  # the mode where u < 0
     rise: list[int]  # the edge from the lower mode to the upper one
@@ -261,7 +263,7 @@ def go_to(surfaces: Surfaces, k: int, side: float, signs: Vector, mode: list[int
     """Go to one side of a surface by its sign, or its machine's mode; return the mode before."""
     i = surfaces.machine[k]
     kept = 0
-    if i < 0:
+    if len(surfaces.rise) == 0 or i < 0:
         signs[surfaces.sign[k]] = side
     else:
         kept = mode[i]
@@ -272,7 +274,7 @@ def go_to(surfaces: Surfaces, k: int, side: float, signs: Vector, mode: list[int
 def go_back(surfaces: Surfaces, k: int, kept: int, signs: Vector, mode: list[int]) -> None:
     """Go back to a sign of 0, or to the mode before."""
     i = surfaces.machine[k]
-    if i < 0:
+    if len(surfaces.rise) == 0 or i < 0:
         signs[surfaces.sign[k]] = 0.0
     else:
         mode[i] = kept
@@ -318,7 +320,7 @@ def flow_on(t: float, y: Vector, mode: list[int], held: Vector, on: Held, dy: Ve
     on : Held
         The system, as the parameters.
     """
-    if on.sliding.count == 0:
+    if len(on.sliding.which) == 0 or on.sliding.count == 0:
         on.functions.flow(t, y, mode, held, on.functions.p, dy)
     else:
         slope_on(on, t, y, mode, dy)
@@ -338,13 +340,12 @@ def margins_on(
     """
     on.functions.margins(t, y, mode, on.functions.p, watch, out)
     sliding, sigma = on.sliding, on.sliding.sigma
-    if sliding.count == 0:
-        return
-    slope_on(on, t, y, mode, sliding.slope)
-    first = len(watch) - 2 * len(sigma)
-    for c in range(sliding.count):
-        out[first + 2 * c] = 1.0 - sigma[c]
-        out[first + 2 * c + 1] = 1.0 + sigma[c]
+    if len(sigma) > 0 and sliding.count > 0:
+        slope_on(on, t, y, mode, sliding.slope)
+        first = len(watch) - 2 * len(sigma)
+        for c in range(sliding.count):
+            out[first + 2 * c] = 1.0 - sigma[c]
+            out[first + 2 * c + 1] = 1.0 + sigma[c]
 
 
 def follow_on(t: float, y: Vector, mode: list[int], held: Vector, on: Held) -> None:
@@ -372,14 +373,15 @@ def arm_on(on: Held, t: float, y: Vector, mode: list[int], watch: list[int]) -> 
     """
     arm, p, surfaces = on.functions.arm, on.functions.p, on.sliding.surfaces
     arm(t, y, mode, p, on.held, watch)
-    for c in range(on.sliding.count):
-        k = on.sliding.which[c]
-        i = surfaces.machine[k]
-        if i >= 0:
-            kept = mode[i]
-            mode[i] = other_mode(surfaces, k, kept)
-            arm(t, y, mode, p, on.held, watch)
-            mode[i] = kept
+    if len(surfaces.rise) > 0:
+        for c in range(on.sliding.count):
+            k = on.sliding.which[c]
+            i = surfaces.machine[k]
+            if i >= 0:
+                kept = mode[i]
+                mode[i] = other_mode(surfaces, k, kept)
+                arm(t, y, mode, p, on.held, watch)
+                mode[i] = kept
 
 
 def other_mode(surfaces: Surfaces, k: int, mode: int) -> int:
@@ -406,16 +408,16 @@ def look(
     """
     p, sliding = on.functions.p, on.sliding
     live, surfaces, which = sliding.live, sliding.surfaces, sliding.which
-    if sliding.count == 0:
+    if len(which) == 0 or sliding.count == 0:
         observe(t, y, mode, live, p, out)
-        return
-    arm_on(on, t, y, mode, sliding.watch)
-    slope_on(on, t, y, mode, sliding.slope)
-    to_neither(sliding, live)
-    _combine(observe, on, t, y, mode, live, False, out)
-    for c in range(sliding.count):
-        if surfaces.machine[which[c]] < 0:
-            live[surfaces.sign[which[c]]] = LIVE
+    else:
+        arm_on(on, t, y, mode, sliding.watch)
+        slope_on(on, t, y, mode, sliding.slope)
+        to_neither(sliding, live)
+        _combine(observe, on, t, y, mode, live, False, out)
+        for c in range(sliding.count):
+            if surfaces.machine[which[c]] < 0:
+                live[surfaces.sign[which[c]]] = LIVE
 
 
 def look_held(
@@ -428,10 +430,10 @@ def look_held(
     observe, on, t, y, mode, out
         As in `look`.
     """
-    machines = False
+    machines, surfaces = False, on.sliding.surfaces
     for c in range(on.sliding.count):
-        machines = machines or on.sliding.surfaces.machine[on.sliding.which[c]] >= 0
-    if machines:
+        machines = machines or surfaces.machine[on.sliding.which[c]] >= 0
+    if len(surfaces.rise) > 0 and machines:
         slope_on(on, t, y, mode, on.sliding.slope)
         _combine(observe, on, t, y, mode, on.held, True, out)
     else:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from gms_fsm.charts.stribeck import GAUSSIAN, dip_of, flat_of
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import Number, Value, names_in, renamed, spell
-from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful
+from gms_fsm.lowering.generated import SIGNALS, CarefulText, ieee, load
 from gms_fsm.lowering.printing.lines import CodeLine, indented
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
 from gms_fsm.lowering.printing.locks import ENDLESS
@@ -242,7 +242,7 @@ def adaptive(plan: ProgramPlan, functions: Mapping[str, Callable[..., Any]]) -> 
     """Return the functions of a plan, with those of its program."""
     source, names = text_of(plan), _names(functions)
     fast = load("what follows from the numbers", source, names)
-    careful = load_careful("what follows from the numbers", source, names)
+    careful = CarefulText("what follows from the numbers", source, names)
     return Adaptive({name: ieee(fast[name], careful[name]) for name in FUNCTIONS})
 
 

@@ -29,9 +29,10 @@ from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
 
 if TYPE_CHECKING:
     from integrators.machine_code.layout import MemoryBlock
+    from integrators.machine_code.objects import Library
     from integrators.runners.compiled import CompiledFunction, RecordArguments
 
-OF_MANY = "functions machines buffers log recorded tally more.adapting more.repeats"
+OF_MANY = "functions machines buffers log more.adapting more.repeats"
 Packed = tuple[FloatArray, FloatArray, FloatArray]
 MOST_ENGINES = 256  # in memory
 MOST_SPARE = 4  # blocks that are kept for further calls
@@ -68,20 +69,26 @@ def engine(
 ) -> CompiledFunction:
     """Return the loop of a program as machine code, which may count its rows.
 
-    Its further entries `adapt` and `repeat` let everything follow from other numbers.
+    Its further functions `adapt` and `repeat` let everything follow from other numbers.
     """
     from integrators.runners import compiled
     from integrators.runners.repeating import repeat
 
     check_llvmlite()
-    own = text_of(program, "" if counting is None else counting.source)
-    text = f"{own} {stamp_of(program.plan)}"
+    text = text_of(program, "" if counting is None else counting.source)
     more = [
         compiled.EntryPoint("adapt", adapt, OF_A_RUN),
         compiled.EntryPoint("repeat", repeat, OF_MANY, ("start", "count", "steps")),
     ]
     with _lock:
-        return compiled.engine(text, run, _calls(program), store(), notify, more)
+        stamp = functools.partial(stamp_of, program.plan)
+        return compiled.engine(text, run, _calls(program), store(), notify, more, stamp)
+
+
+def with_more(engine: CompiledFunction) -> Library:
+    """Return the machine code of an engine with its further functions."""
+    with _lock:
+        return engine.extended
 
 
 def text_of(program: Program, more: str = "") -> str:

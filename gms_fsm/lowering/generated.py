@@ -70,11 +70,25 @@ def quickened(namespace: dict[str, Any]) -> dict[str, Any]:
     return namespace
 
 
-def load_careful(title: str, source: str, names: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Run generated text with functions and numbers that never raise, for use by `ieee`."""
-    namespace: dict[str, Any] = {**NAMESPACE, **(names or {}), **_IEEE, "_wide": _wide}
-    exec(_compiled(title, source, careful=True), namespace)
-    return namespace
+class CarefulText:
+    """Generated text with functions and numbers that never raise, for use by `ieee`.
+
+    It is run when one of its functions is called first, in most runs never.
+    """
+
+    def __init__(self, title: str, source: str, names: Mapping[str, Any] | None = None) -> None:
+        self._text = title, source
+        self._names = {**NAMESPACE, **(names or {}), **_IEEE, "_wide": _wide}
+
+    @functools.cached_property
+    def _namespace(self) -> dict[str, Any]:
+        namespace = dict(self._names)
+        exec(_compiled(*self._text, careful=True), namespace)
+        return namespace
+
+    def __getitem__(self, name: str) -> Callable[..., Any]:
+        """Return a function of the text."""
+        return lambda *arguments: self._namespace[name](*arguments)
 
 
 def standalone(source: str) -> str:
@@ -221,7 +235,7 @@ def ieee(fast: Callable[..., Any], careful: Callable[..., Any]) -> Callable[...,
     Examples
     --------
     >>> source = "def rate(y, dy):\n    dy[0] = 1.0 / y[0]\n"
-    >>> rate = ieee(load("example", source)["rate"], load_careful("example", source)["rate"])
+    >>> rate = ieee(load("example", source)["rate"], CarefulText("example", source)["rate"])
     >>> dy = [0.0]
     >>> rate([0.0], dy)
     >>> dy

@@ -38,7 +38,7 @@ from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.language import Binary, Call, Comparison, Requirement, Value, rough_points, spell
 from gms_fsm.lowering.adapting import Adaptive, adaptive
-from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful, quickened
+from gms_fsm.lowering.generated import SIGNALS, CarefulText, ieee, load, quickened
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.printing.plan import Pair, ProgramPlan, both_sides, plan_of
 from gms_fsm.lowering.printing.python import FUNCTIONS, python
@@ -237,7 +237,7 @@ def _lowered(shape: _ProgramShape) -> Program:
     }
     names = _names(callables)
     namespace = quickened(load(plan.title, source, names))
-    careful = load_careful(plan.title, source, names)
+    careful = CarefulText(plan.title, source, names)
     return Program(
         source=source,
         functions={name: namespace[name] for name in FUNCTIONS},
@@ -428,4 +428,6 @@ def _surface_table(plan: ProgramPlan) -> integrators.Surfaces:
         relations = (plan.relations.index(each, i or 0) for each in (above, at_least))
         for column, value in zip(table, (sign, *relations, *machine), strict=True):
             column.append(value)
+    if all(machine < 0 for machine in table.machine):
+        return table._replace(upper=[], lower=[], rise=[], fall=[])
     return table

@@ -21,7 +21,7 @@ from gms_fsm.charts.parameters import as_floats
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.lowering.adapting import SHARE
-from gms_fsm.lowering.generated import ieee, load, load_careful
+from gms_fsm.lowering.generated import CarefulText, ieee, load
 from gms_fsm.lowering.printing.scale_text import HELPERS, scale_text
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.models import Model
@@ -138,7 +138,7 @@ def _function(key: ByIdentity[Chart], curved: bool) -> Callable[..., Any]:
     every = frozenset(key.it.parameter_names)
     source = "\n".join(scale_text(key.it, "scale", every, curved=curved)) + "\n"
     title = f"scales of {key.it.name}"
-    fast, careful = load(title, source, HELPERS), load_careful(title, source, HELPERS)
+    fast, careful = load(title, source, HELPERS), CarefulText(title, source, HELPERS)
     return ieee(fast["scale"], careful["scale"])
 
 

@@ -18,7 +18,7 @@ from gms_fsm.charts.nesting import spelled
 from gms_fsm.errors import ChartError, ParameterError, shown
 from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.language import PYTHON, Condition, names_in, spell
-from gms_fsm.lowering.generated import ieee, load, load_careful
+from gms_fsm.lowering.generated import CarefulText, ieee, load
 from gms_fsm.lowering.program import Arguments, Program
 from gms_fsm.systems.models import Model
 from gms_fsm.traces.scope import GuardValues, parameter_values
@@ -95,7 +95,7 @@ class Guard:
         self.held = False  # at the last call
         source = f"def holds(element):\n    return {spell(condition, PYTHON, names)}\n"
         self.holds: Callable[[Element], bool] = ieee(
-            load(f"guard {edge}", source)["holds"], load_careful(f"guard {edge}", source)["holds"]
+            load(f"guard {edge}", source)["holds"], CarefulText(f"guard {edge}", source)["holds"]
         )
 
     def __reduce__(self) -> tuple[type[Guard], tuple[str, Condition]]:

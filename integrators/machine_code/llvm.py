@@ -77,7 +77,11 @@ def llvm_text(module: Module) -> str:
     foreign: dict[str, int] = {}
     functions = [_Writer(function, module, foreign).text() for function in module.functions]
     lines = [_table(table) for table in module.tables]
-    if module.callbacks:
+    for name, kinds in module.outer.items():
+        lines.append(f"declare i64 @{name}({', '.join(_TYPES[kind] for kind in kinds)})")
+    if module.callbacks and module.outer:  # those of the other module
+        lines.append(f"@callbacks = external global [{module.callbacks} x ptr]")
+    elif module.callbacks:
         lines.append(f"@callbacks = global [{module.callbacks} x ptr] zeroinitializer")
     lines += ["declare double @llvm.sqrt.f64(double)", "declare double @llvm.fabs.f64(double)"]
     lines += ["declare double @llvm.copysign.f64(double, double)"]
@@ -85,13 +89,13 @@ def llvm_text(module: Module) -> str:
         arguments = ", ".join(["double"] * count)
         lines.append(f"declare double @{name}({arguments}) nounwind memory(none)")
     # Addresses, integers and floats in memory do not overlap.
-    kinds = [
+    aliases = [
         '!0 = !{!"memory"}',
         *(f'!{k} = !{{!"{name}", !0}}' for k, name in enumerate(("f", "i", "b", "p"), 1)),
         *(f"!{k + 4} = !{{!{k}, !{k}, i64 0}}" for k in range(1, 5)),
     ]
-    kinds += ["!9 = distinct !{!9, !10}", '!10 = !{!"llvm.loop.unroll.full"}']
-    return "\n".join([*lines, *functions, *kinds, ""])
+    aliases += ["!9 = distinct !{!9, !10}", '!10 = !{!"llvm.loop.unroll.full"}']
+    return "\n".join([*lines, *functions, *aliases, ""])
 
 
 _ALIAS = {"f": "!5", "i": "!6", "b": "!7", "p": "!8"}
@@ -129,7 +133,8 @@ class _Writer:
 
     def __init__(self, function: TypedFunction, module: Module, foreign: dict[str, int]) -> None:
         self.function, self.module, self.foreign = function, module, foreign
-        self.results = {each.name: each.results for each in module.functions}
+        self.results = dict.fromkeys(module.outer, "i")
+        self.results |= {each.name: each.results for each in module.functions}
         self.lines: list[str] = []
         self.counter = 0
         self.loops: list[tuple[str, str]] = []  # labels of continue and break

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import threading
+from collections.abc import Collection
 from typing import Any
 
 __all__ = ["Library", "compiled", "target_name"]
@@ -49,13 +50,25 @@ def target_name() -> str:
     return f"{version} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
 
 
-def compiled(text: str) -> bytes:
+def _builder(machine: Any, speed: int) -> Any:
+    llvm = _binding()
+    options = llvm.create_pipeline_tuning_options(speed_level=speed)
+    # Short loops are not worth vectors.
+    options.loop_vectorization = False
+    options.slp_vectorization = False
+    return llvm.create_pass_builder(machine, options)
+
+
+def compiled(text: str, hot: Collection[str] | None = None) -> bytes:
     """Return the object of a module.
 
     Parameters
     ----------
     text : str
         From `integrators.machine_code.llvm.llvm_text`.
+    hot : collection of str, optional
+        The functions in which the time is spent; the others are made only a little slower, in much
+        less time. All of them if omitted.
 
     Returns
     -------
@@ -75,12 +88,14 @@ def compiled(text: str) -> bytes:
         module = llvm.parse_assembly(text)
         module.verify()
         machine = _machine()
-        options = llvm.create_pipeline_tuning_options(speed_level=3)
-        # Short loops are not worth vectors.
-        options.loop_vectorization = False
-        options.slp_vectorization = False
-        builder = llvm.create_pass_builder(machine, options)
+        thorough = _builder(machine, 3)
+        builder = thorough if hot is None else _builder(machine, 1)
         builder.getModulePassManager().run(module, builder)
+        if hot is not None:
+            passes = thorough.getFunctionPassManager()
+            for function in module.functions:
+                if function.name in hot and not function.is_declaration:
+                    passes.run(function, thorough)
         return bytes(machine.emit_object(module))
 
 
@@ -97,7 +112,12 @@ class Library:
         llvm = _binding()
         with _lock:
             self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
-            self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+        self.add(content)
+
+    def add(self, content: bytes) -> None:
+        """Load a further object, which may call the entries of those before."""
+        with _lock:
+            self._engine.add_object_file(_binding().ObjectFileRef.from_data(content))
             self._engine.finalize_object()
 
     def address(self, name: str) -> int:

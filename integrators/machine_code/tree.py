@@ -301,6 +301,16 @@ Statement = Assign | AssignMany | Put | Do | If | While | For | Break | Continue
 
 # --------------------------------------------------------------------------- modules
 @dataclass(frozen=True)
+class OuterEntry:
+    """An entry of a module that is in memory already, called with arrays and integers.
+
+    It stands for a function that returns an integer.
+    """
+
+    name: str
+
+
+@dataclass(frozen=True)
 class TypedFunction:
     """A function; entries can be called from outside.
 
@@ -350,3 +360,4 @@ class Module:
     functions: list[TypedFunction] = field(default_factory=list)
     tables: list[ConstantTable] = field(default_factory=list)
     callbacks: int = 0
+    outer: dict[str, str] = field(default_factory=dict)  # entries of others: kinds of arguments

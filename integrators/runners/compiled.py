@@ -39,7 +39,7 @@ from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
-from integrators.machine_code.tree import Local
+from integrators.machine_code.tree import Local, OuterEntry
 from integrators.runners import columns, observing, repeating, stepping, varying
 from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
 from integrators.runners.stepping import Sample
@@ -89,6 +89,13 @@ NOT_INLINE = [
 ]  # fmt: skip
 # A step calls these seven times. Inline, the slopes stay in registers: a tenth of the time.
 INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", "flow_on"), True)
+
+
+# Every step calls these.
+HOT = {
+    "advance", "first_change", "_bracket", "interpolate", "margins", "observe_rows", "_probe",
+    "_search", "switch", "weighted_sum",
+}  # fmt: skip
 
 
 class RecordArguments(NamedTuple):
@@ -223,7 +230,9 @@ def edition() -> str:
                 constants.append((name, sorted(value.values())))  # an empty one is filled later
             else:
                 constants.append((name, getattr(value, "__match_args__", None)))
-    return digest(*functions, text=repr((sys.version, constants)))
+    return digest(
+        *functions, text=repr((sys.version, constants, sorted(INLINE.items()), sorted(HOT)))
+    )
 
 
 def _is_table(value: Any) -> bool:
@@ -257,12 +266,15 @@ class CompiledFunction:
         The functions of the host program that it calls.
     extra : int
         Number of integers that are passed besides the block.
+    more : callable, optional
+        Returns an object with further functions on the same block, which may call `entry`.
     """
 
     layout: BlockLayout
     library: Library
     calls: Sequence[Callable[[float], float]]
     extra: int
+    more: Callable[[], bytes] | None = None
     _function: Any = field(init=False)
     _now: threading.local = field(default_factory=threading.local)  # `call`: of each thread
 
@@ -277,6 +289,13 @@ class CompiledFunction:
             places = (ctypes.c_void_p * len(self.calls)).from_address(table)
             for k, each in enumerate(self._thunks):
                 places[k] = ctypes.cast(each, ctypes.c_void_p).value
+
+    @functools.cached_property
+    def extended(self) -> Library:
+        """Return the machine code with the further functions, made when they are wanted first."""
+        if self.more is not None:
+            self.library.add(self.more())
+        return self.library
 
     def _guarded(self, call: Callable[[float], float]) -> Callable[[float], float]:
         """Return a function that never raises: machine code could not pass it on."""
@@ -319,7 +338,7 @@ def is_known(part: Any) -> bool:
     bool
         True for functions and the coefficients of a method, which are known while translating.
     """
-    return callable(part) or isinstance(part, Coefficients)
+    return callable(part) or isinstance(part, Coefficients | OuterEntry)
 
 
 def _made(
@@ -332,11 +351,11 @@ def _made(
 ) -> CompiledFunction:
     """Return an engine from the store, or compile it; it calls the first entry."""
     layout = BlockLayout(arguments, is_known, inside=_longest(arguments) <= LONGEST_INSIDE)
-    library = _library(text, arguments, layout, entries, store, notify)
-    return CompiledFunction(layout, library, calls, len(entries[0].extra))
+    content = _object(text, arguments, layout, entries, store, notify)
+    return CompiledFunction(layout, Library(content), calls, len(entries[0].extra))
 
 
-def _library(
+def _object(
     text: str,
     arguments: Any,
     layout: BlockLayout,
@@ -345,7 +364,7 @@ def _library(
     notify: Callable[[str], None],
     *,
     each: bool = False,
-) -> Library:
+) -> bytes:
     """Return machine code from the store, or compile it."""
     # Which of the functions in the text are called, and the coefficients.
     fixed = [
@@ -360,11 +379,12 @@ def _library(
         started = time.perf_counter()
         notify("compiling, once for each chart and method ...")
         translator = translated(layout, entries, each=each)
-        content = objects.compiled(llvm_text(translator.module))
+        hot = {name for name, own in translator.origins.items() if own in HOT}
+        content = objects.compiled(llvm_text(translator.module), hot)
         if store is not None:
             store.put(name, content)
         notify(f"compiled in {time.perf_counter() - started:.1f} s")
-    return Library(content)
+    return content
 
 
 def translated(
@@ -408,6 +428,7 @@ def engine(
     store: CodeStore | None,
     notify: Callable[[str], None],
     more: Sequence[EntryPoint] = (),
+    text_of_more: Callable[[], str] = str,
 ) -> CompiledFunction:
     """Return `integrators.runners.columns.record` as machine code for one system.
 
@@ -424,7 +445,10 @@ def engine(
     notify : callable
         Called with a text before the system is compiled, which takes a while, and afterwards.
     more : sequence of EntryPoint
-        Further functions on the same block; `text` changes with them, too.
+        Further functions on the same block, an object of their own, which is made when
+        `CompiledFunction.extended` is asked for. As `OuterEntry`, ``"entry"`` is this engine.
+    text_of_more : callable, optional
+        Returns a text that changes with them.
 
     Returns
     -------
@@ -432,7 +456,12 @@ def engine(
         To be called with a block, the largest number of steps, and whether to pause.
     """
     record = EntryPoint("entry", columns.record, RECORD, ("steps", "pause"))
-    return _made(text, arguments, (record, *more), calls, store, notify)
+    made = _made(text, arguments, [record], calls, store, notify)
+    if more:
+        made.more = lambda: _object(
+            f"{text} {text_of_more()}", arguments, made.layout, more, store, notify
+        )
+    return made
 
 
 @dataclass(eq=False)
@@ -479,7 +508,7 @@ def stepper(
     layout = BlockLayout(arguments, is_known)
     entry = EntryPoint("entry", stepping.step_to)
     return CompiledStepper(
-        layout, _library(text, arguments, layout, [entry], store, notify, each=True)
+        layout, Library(_object(text, arguments, layout, [entry], store, notify, each=True))
     )
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from integrators.loop import ROWS, Buffers, Machines
-from integrators.runners.columns import LogColumns, Recorded, RowTally, put_modes, record
+from integrators.runners.columns import LogColumns, put_modes
 from integrators.runners.observing import observe_row
 from integrators.sliding import Functions, Held
 from integrators.steps import Vector
@@ -18,6 +18,7 @@ from integrators.steps import Vector
 class Repeats(NamedTuple):
     """What `repeat` needs besides the arguments of a run."""
 
+    run: Callable[..., int]  # run(words, most_steps, pause): `record` on the block
     follow: Callable[..., float]  # lets everything follow from the numbers, returns the time scale
     words: list[int]  # the block
     floats: Vector  # the same memory
@@ -36,8 +37,6 @@ def repeat(
     machines: Machines,
     b: Buffers,
     log: LogColumns,
-    recorded: Recorded,
-    tally: RowTally,
     more: Any,
     repeats: Repeats,
     start: int,
@@ -65,7 +64,7 @@ def repeat(
                 own[row][column] = values[j]
         time = repeats.follow(functions, b, log.seen, b.sliding.live, more)
         repeats.floats[repeats.scale[0]] = time
-        event = record(functions, machines, b, log, recorded, tally, most_steps, False)
+        event = repeats.run(words, most_steps, False)
         if event == ROWS and log.firings >= len(log.t):
             log.firings = fired
             return run

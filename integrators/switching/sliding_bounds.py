@@ -147,14 +147,15 @@ def seize(on: Held, now: Now, w: Watched) -> bool:
     held, sliding, surfaces = on.held, on.sliding, on.sliding.surfaces
     which, sigma, rates, gains = sliding.which, sliding.sigma, sliding.rates, sliding.gains
     most, size = len(sigma), len(y)
-    for k in range(len(surfaces.sign)):
-        if surfaces.machine[k] >= 0 and sliding.arrived[k] == 1 and _is_far(on, now, w, k):
-            sliding.arrived[k] = 0
+    if len(surfaces.rise) > 0:
+        for k in range(len(surfaces.sign)):
+            if surfaces.machine[k] >= 0 and sliding.arrived[k] == 1 and _is_far(on, now, w, k):
+                sliding.arrived[k] = 0
     count = 0
     for k in range(len(surfaces.sign)):
         above, i = surfaces.above[k], surfaces.machine[k]
         met = sliding.flags[k] == 1 or sliding.arrived[k] == 1
-        if i < 0:
+        if len(surfaces.rise) == 0 or i < 0:
             met = met or w.start[above] == 0.0
         else:
             met = met and (mode[i] == surfaces.upper[k] or mode[i] == surfaces.lower[k])
@@ -178,7 +179,7 @@ def seize(on: Held, now: Now, w: Watched) -> bool:
         k = which[worst]
         u = w.start[surfaces.above[k]]
         pushed = sigma[worst] if gains[worst] < 0.0 else rates[worst]
-        if surfaces.machine[k] < 0:
+        if len(surfaces.rise) == 0 or surfaces.machine[k] < 0:
             held[surfaces.sign[k]] = _sign(pushed if u == 0.0 or sliding.flags[k] == 1 else u)
         elif sliding.flags[k] == 1 and pushed != 0.0:
             release(on, now, w, k, pushed)
@@ -250,32 +251,30 @@ def _sign(u: float) -> float:
 
 def look_back(on: Held, now: Now, w: Watched) -> None:
     """Keep where the surfaces slid on are before something may jump; see `let_go`."""
-    if on.sliding.count == 0:
-        return
-    _values(on, now, w)
-    for k in range(len(on.sliding.before)):
-        on.sliding.before[k] = w.search.probe[on.sliding.surfaces.above[k]]
+    if len(on.sliding.which) > 0 and on.sliding.count > 0:
+        _values(on, now, w)
+        for k in range(len(on.sliding.before)):
+            on.sliding.before[k] = w.search.probe[on.sliding.surfaces.above[k]]
 
 
 def let_go(on: Held, now: Now, w: Watched) -> None:
     """Stop sliding on surfaces that have jumped away, or from which the state has."""
-    if on.sliding.count == 0:
-        return
-    sliding, y = on.sliding, now.y
-    g = sliding.upper
-    _values(on, now, w)
-    for k in range(len(sliding.flags)):
-        jump = w.search.probe[sliding.surfaces.above[k]] - sliding.before[k]
-        if sliding.flags[k] == 1 and jump != 0.0:
-            on.functions.normal(k, time_of(now), y, now.mode, on.functions.p, g)
-            square, far = 0.0, False
-            for j in range(len(y)):
-                square += g[j] * g[j]
-            for j in range(len(y)):
-                least = NEGLIGIBLE * now.floor[j] + NEARLY * abs(y[j])
-                far = far or abs(g[j] * jump) > least * square
-            if far:
-                drop(sliding, k)
+    if len(on.sliding.which) > 0 and on.sliding.count > 0:
+        sliding, y = on.sliding, now.y
+        g = sliding.upper
+        _values(on, now, w)
+        for k in range(len(sliding.flags)):
+            jump = w.search.probe[sliding.surfaces.above[k]] - sliding.before[k]
+            if sliding.flags[k] == 1 and jump != 0.0:
+                on.functions.normal(k, time_of(now), y, now.mode, on.functions.p, g)
+                square, far = 0.0, False
+                for j in range(len(y)):
+                    square += g[j] * g[j]
+                for j in range(len(y)):
+                    least = NEGLIGIBLE * now.floor[j] + NEARLY * abs(y[j])
+                    far = far or abs(g[j] * jump) > least * square
+                if far:
+                    drop(sliding, k)
 
 
 def _values(on: Held, now: Now, w: Watched) -> None:
@@ -308,7 +307,7 @@ def let_go_in_time(on: Held, now: Now, relations: Watched) -> None:
 def crossed(sliding: Sliding, machine: int, edge: int) -> None:
     """Note that an edge leads onto a machine's surface, or away from it."""
     surfaces = sliding.surfaces
-    for k in range(len(surfaces.machine)):
+    for k in range(len(surfaces.rise)):
         if surfaces.machine[k] == machine:
             if edge == surfaces.rise[k] or edge == surfaces.fall[k]:
                 sliding.arrived[k] = min(sliding.arrived[k] + 1, 1)

@@ -20,6 +20,7 @@ whatever its size, a stop lets go where it would have to pull.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
@@ -309,15 +310,16 @@ class Locks:
         """
         left = {r: list(self.free(each.row)) for r, each in enumerate(self.rows)}
         leaves: list[tuple[int, str]] = []
+        moved = Counter(body for bodies in left.values() for body in bodies)
         while ends := [
             (self.rows[r].row[body] not in UNITS, r, body)
             for r, bodies in left.items()
             for body in bodies
-            if sum(body in others for others in left.values()) == 1
+            if moved[body] == 1
         ]:
             _, r, body = min(ends)
             leaves.insert(0, (r, body))
-            del left[r]
+            moved.subtract(left.pop(r))
         return [*left], leaves
 
     def followers(self) -> list[str]:
@@ -375,9 +377,11 @@ class Locks:
     def contradicted(self, names: Mapping[str, str]) -> list[CodeLine]:
         """Write that no force holds a contact where other locks, or what is driven, move it."""
         lines: list[CodeLine] = []
+        # A row that closes no loop is independent of the others, whichever of them hold.
+        doubtful = {*self.sequence()[0]} if self.joins_trees() else {*range(len(self.rows))}
         for r, each in enumerate(self.rows):
             bank = self.read.banks[each.bank]
-            if not bank.locked or self.always_holds(r):
+            if not bank.locked or r not in doubtful:
                 continue
             tree = self.relative(each.row, names)
             size = " + ".join(
@@ -393,10 +397,6 @@ class Locks:
                 CodeLine(f"        {force} = {force} + u * {ENDLESS}"),
             ]
         return lines
-
-    def always_holds(self, r: int) -> bool:
-        """Return whether a row is independent of the others, whichever of them hold."""
-        return r not in self.sequence()[0] and self.joins_trees()
 
     def shares(self, r: int, names: Mapping[str, str]) -> list[CodeLine]:
         """Write what the force, or impulse, of a row does to the bodies."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful, quickened
+from gms_fsm.lowering.generated import SIGNALS, CarefulText, ieee, load, quickened
 from gms_fsm.lowering.printing.counting import Counting, CountPlaces
 from gms_fsm.run.problem import Problem
 
@@ -108,4 +108,4 @@ def _functions(source: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
         raise ArithmeticError
 
     fast = quickened(load("counting", source, SIGNALS))["count"]
-    return fast, ieee(fails, load_careful("counting", source, SIGNALS)["count"])
+    return fast, ieee(fails, CarefulText("counting", source, SIGNALS)["count"])

@@ -20,11 +20,14 @@ class Following(NamedTuple):
 def following_of(start: Problem) -> Following:
     """Return it for a start, with columns that any number of runs may have."""
     from integrators.machine_code.layout import OuterArray
+    from integrators.machine_code.tree import OuterEntry
 
     column: Any = OuterArray
+    entry: Any = OuterEntry("entry")
     layout = start.program.layout
     width = 1 + layout.y.size + layout.observed.size
     repeats = Repeats(
+        entry,
         adapt,
         words=column("i"),
         floats=column(),

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm.lowering.compiling import with_more
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import STEPS_AT_ONCE, WORTH_A_LOOK, Columns
 from gms_fsm.run.recording.counted import CountTables
@@ -64,7 +65,7 @@ class RepeatedRun:
         self.floats = columns.block.words.view(float)
         self.first = columns.block.copy()
         call = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)
-        library = columns.engine.library
+        library = with_more(columns.engine)
         self._adapt: Any = call(library.address("adapt"))
         several = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, *[ctypes.c_int64] * 3)
         self._repeat: Any = several(library.address("repeat"))

@@ -36,6 +36,7 @@ from integrators.machine_code.tree import (
     Local,
     Logic,
     Op,
+    OuterEntry,
     may_write,
     parts_of,
 )
@@ -293,6 +294,8 @@ def condition(work: Work, node: ast.expr) -> Expr:
             if made is not None and len(work.out) != before:
                 raise work.error("after and and or only plain expressions are possible")
             made = part if made is None else join(made, part)
+            if isinstance(made, Const) and made.value is isinstance(node.op, ast.Or):
+                break  # what comes after it is never asked, and not translated
         assert made is not None
         return made
     expr = number(work, node)
@@ -348,10 +351,27 @@ def call(work: Work, node: ast.Call) -> Value | None:
         return _own_call(work, function, arguments)
     if function is len:
         return _length(work, arguments[0])
+    if isinstance(function, OuterEntry):
+        return _outer_call(work, function.name, arguments)
     parts = [each.expr for each in arguments if isinstance(each, NumberValue)]
     if len(parts) != len(arguments):
         raise work.error("the function takes numbers")
     return NumberValue(_known_call(work, function, parts))
+
+
+def _outer_call(work: Work, name: str, arguments: list[Value]) -> Value:
+    """Return a call of an entry of another module."""
+    passed: list[Expr] = []
+    for each in arguments:
+        match each:
+            case ArrayValue():
+                passed.append(AddressOf(each.address))
+            case NumberValue(expr=expr):
+                passed.append(as_kind(work, expr, "i"))
+            case _:
+                raise work.error("another module's entry takes arrays and integers")
+    work.translator.module.outer[name] = "".join(each.kind for each in passed)
+    return NumberValue(Invoke("i", name, tuple(passed)))
 
 
 def _known_call(work: Work, function: Any, parts: list[Expr]) -> Expr:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import linecache
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -94,6 +94,15 @@ def _meaning(code: types.CodeType) -> list[Any]:
     return [code.co_code, code.co_names, code.co_varnames, constants]
 
 
+def _functions_in(tree: ast.AST) -> Iterator[ast.FunctionDef]:
+    """Yield the functions of a text, those inside other statements too."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.FunctionDef):
+            yield node
+        if not isinstance(node, ast.expr):
+            yield from _functions_in(node)
+
+
 def _file(code: types.CodeType, names: dict[str, Any]) -> _File:
     lines = linecache.getlines(code.co_filename, names)
     text = "".join(lines)
@@ -102,8 +111,7 @@ def _file(code: types.CodeType, names: dict[str, Any]) -> _File:
         tree = ast.parse(text)
         definitions = {
             (node.name, min([node.lineno, *(each.lineno for each in node.decorator_list)])): node
-            for node in ast.walk(tree)
-            if isinstance(node, ast.FunctionDef)
+            for node in _functions_in(tree)
         }
         codes, found = [compile(tree, code.co_filename, "exec", dont_inherit=True)], {}
         while codes:

@@ -59,6 +59,8 @@ class Translator:
     ----------
     module : Module
         The functions so far.
+    origins : dict of str to str
+        By their names in the module: their own names.
 
     Examples
     --------
@@ -75,6 +77,7 @@ class Translator:
     def __init__(self, inline: Mapping[str, bool] | None = None) -> None:
         self.inline = inline or {}
         self.module = Module()
+        self.origins: dict[str, str] = {}  # by the name of a translation: the function's own
         self._done: dict[Any, Specialised] = {}
         self._kept: list[Any] = []  # objects whose `id` is part of a key
         self._made: dict[Any, list[TypedFunction]] = {}
@@ -218,6 +221,7 @@ class Translator:
             if other.body == statements:
                 return Specialised(other, work.first.get("return"), slots)
         made = replace(made, name=self._free(name))
+        self.origins[made.name] = function.__name__
         alike.append(made)
         self.module.functions.append(made)
         return Specialised(made, work.first.get("return"), slots)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -114,9 +115,8 @@ class Work:
     def count_assignments(self, *nodes: ast.AST) -> None:
         """Count assignments to names."""
         for node in nodes:
-            for each in ast.walk(node):
-                if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store):
-                    self.assigned[each.id] = self.assigned.get(each.id, 0) + 1
+            for name in _assigned_in(node):
+                self.assigned[name] = self.assigned.get(name, 0) + 1
 
     def error(self, reason: str) -> TranslationError:
         """Return an error at the present line."""
@@ -164,6 +164,13 @@ class Work:
     def constant(self, expr: Expr) -> bool:
         """Return whether an expression reads nothing but parameters."""
         return all(each in self.parameters for each in locals_in(expr))
+
+
+@functools.lru_cache(maxsize=1024)
+def _assigned_in(node: ast.AST) -> tuple[str, ...]:
+    """Return the names that a part of a text assigns, as often as it does."""
+    names = (each for each in ast.walk(node) if isinstance(each, ast.Name))
+    return tuple(each.id for each in names if isinstance(each.ctx, ast.Store))
 
 
 def as_kind(work: Work, expr: Expr, kind: str) -> Expr:
