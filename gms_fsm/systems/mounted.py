@@ -215,10 +215,10 @@ def mounted(model: Model | System, rig: Rig | None = None, period: float | None 
                 advice=misplaced(given),
             )
     assert rig is not None
+    own: Any = model
     if bound := {*getattr(rig, "inputs", {})} & {*getattr(model, "inputs", {})}:
-        own: Any = model
-        model = replace(own, inputs={**own.inputs, **{name: name for name in bound}})
-    return Mounted(system_of(model, rig, period), model, rig, named=False)
+        own = replace(own, inputs={**own.inputs, **{name: name for name in bound}})
+    return Mounted(system_of(own, rig, period), own, rig, named=False)
 
 
 OF_ANOTHER_PLACE = {  # what is often given where it does not belong, by the name of its class

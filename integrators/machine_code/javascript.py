@@ -134,7 +134,7 @@ class _Script(CWriter):
         tables: Mapping[str, int],
     ) -> None:
         self.tables = tables
-        self.declared = dict[int, frozenset[str]]()
+        self.let_at = dict[int, frozenset[str]]()
         super().__init__(function, results, functions, locals_, CFields(()))
 
     def text(self, *, static: bool) -> str:
@@ -143,10 +143,10 @@ class _Script(CWriter):
         function = self.function
         names = ", ".join(self.name(each.name) for each in function.parameters)
         lines = [f"function {self.functions(function.name)}({names}) {{"]
-        self.declared = {
+        self.let_at = {
             at: names - self.unread for at, names in declarations(function.body).items()
         }
-        later = {name for names in self.declared.values() for name in names}
+        later = {name for names in self.let_at.values() for name in names}
         own = [
             f"{self.name(each.name)} = {_ZEROS[each.kind]}"
             for each in function.variables
@@ -162,7 +162,7 @@ class _Script(CWriter):
     # ------------------------------------------------------------------ statements
     def statement(self, statement: Statement, depth: int) -> list[str]:
         """Write a statement."""
-        space, declared = "    " * depth, self.declared.get(id(statement), frozenset())
+        space, declared = "    " * depth, self.let_at.get(id(statement), frozenset())
         match statement:
             case Assign(target=target) | For(target=target) if target.name in declared:
                 first, *more = super().statement(statement, depth)

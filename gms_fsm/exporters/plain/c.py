@@ -203,8 +203,8 @@ class PlainC:
             f"{self.signature()};",
             "",
             "/* One sample, in which the velocity goes from v0 to v1 on a straight line: the force",
-            f" * at its end [{self.element.force}]. A change of direction is found, in at most four "
-            "steps. Limits:",
+            f" * at its end [{self.element.force}]. A change of direction is found, in at most",
+            " * four steps. Limits:",
             *(f" * - {FORMS.clean(each)};" for each in limits_of(element)[:-1]),
             f" * - {FORMS.clean(limits_of(element)[-1])}. */",
             f"{self.sample_signature()};",

@@ -365,7 +365,7 @@ def _outer_call(work: Work, name: str, arguments: list[Value]) -> Value:
     for each in arguments:
         match each:
             case ArrayValue():
-                passed.append(AddressOf(each.address))
+                passed.append(each.beginning)
             case NumberValue(expr=expr):
                 passed.append(as_kind(work, expr, "i"))
             case _:
