@@ -58,6 +58,7 @@ from gms_fsm import (
     Supervisor,
     Sweep,
     System,
+    SystemState,
     Trace,
     Transition,
     choose,
@@ -2317,6 +2318,70 @@ rows = {
         "", ..., lambda: FrictionEquations(GIVEN).force(0.0, np.zeros(5), 0.0)),
 }  # fmt: skip
 group("stepping", ParameterError, lambda make: make(), rows)
+
+
+def steps() -> SystemState:
+    """Return a system after a sample."""
+    state = SystemState(OPEN)
+    state.advance(0.3, u=0.5)
+    return state
+
+
+def same_after(call: Callable[[SystemState], object]) -> None:
+    """Make a call that must leave the system as it was."""
+    state, other = steps(), steps()
+    try:
+        call(state)
+    finally:
+        found = [(each.t, each.value("x"), each.states, each.switches) for each in (state, other)]
+        assert found[0] == found[1]
+
+
+OPEN = System(
+    "open",
+    bodies=(Body("mass", inertia=1.0, force="u - x + f"),),
+    contacts=(Contact("pad", GIVEN),),
+    signals={"f": "0.1 * t"},
+    inputs=("u",),
+)
+rows = {
+    "no input": ("system 'open'", ..., lambda s: s.advance(0.1)),
+    "another input": ("system 'open'", ..., lambda s: s.advance(0.1, w=1.0)),
+    "input too many": ("system 'open'", ..., lambda s: s.advance(0.1, u=1.0, w=1.0)),
+    "NaN": ("u", NAN, lambda s: s.advance(0.1, u=NAN)),
+    "infinite end": ("u", INF, lambda s: s.peek(0.1, u=(0.0, INF))),
+    "three values": ("u", [1.0, 2.0, 3.0], lambda s: s.advance(0.1, u=[1.0, 2.0, 3.0])),
+    "word": ("u", "fast", lambda s: s.advance(0.1, u="fast")),
+    "back in time": ("dt", -1.0, lambda s: s.advance(-1.0, u=1.0)),
+    "earlier time": ("t", 0.1, lambda s: s.advance_to(0.1, u=1.0)),
+    "time beyond the clock": ("t", 1e10, lambda s: s.advance_to(1e10, u=1.0)),
+    "name": ("", ..., lambda s: s.value("pad.z9")),
+    "name of a look ahead": ("", ..., lambda s: s.peek(0.1, "y", u=1.0)),
+    "event": ("", ..., lambda s: s.send("oil")),
+    "snapshot of a friction": (
+        "snapshot",
+        ...,
+        lambda s: s.restore(FrictionState(GIVEN).snapshot()),
+    ),
+}  # fmt: skip
+group("step of a system", ParameterError, same_after, rows)
+opened = partial(dataclasses.replace, OPEN)
+rows = {
+    "model": ("system", GIVEN, lambda: SystemState(GIVEN)),
+    "function": ("signal 'f'", ..., lambda: SystemState(opened(signals={"f": abs}))),
+    "record": (
+        "signal 'f'", ..., lambda: SystemState(opened(signals={"f": ([0, 1], [0, 1])}))),
+    "no location": ("settings", ..., lambda: SystemState(OPEN, events="step", max_step=0.1)),
+    "open run": ("system 'open'", ..., lambda: simulate(OPEN, 1.0)),
+    "open session": ("system 'open'", ..., lambda: Session(OPEN, 1.0)),
+    "unknown input": ("inputs", ..., lambda: simulate(OPEN, 1.0, inputs={"w": 1.0})),
+    "no mapping": ("inputs", "1", lambda: simulate(OPEN, 1.0, inputs="1")),
+    "inputs of a model": (
+        "inputs", {"u": 1.0}, lambda: simulate(GIVEN, STILL, 1.0, inputs={"u": 1.0})),
+    "input used twice": ("system 'open'", ..., lambda: opened(inputs=("u", "x"))),
+    "input with a bad name": ("system 'open', input", ..., lambda: opened(inputs=("2u",))),
+}  # fmt: skip
+group("inputs of a system", ParameterError, lambda make: make(), rows)
 # --------------------------------------------------------------------------- sessions
 FIG4 = stick_slip("published"), Prescribed(FIG4_SINE)
 

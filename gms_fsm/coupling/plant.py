@@ -1,8 +1,8 @@
 """A system whose inputs come sample by sample: its memory, and what advances it.
 
 A sample ends before what happens just there. Whether an input jumps there is known only when the
-next sample begins, and a run ends its last step before a jump one clock tick earlier. So a sample
-supposes what the one before it had; if that was wrong, it is advanced again. Then all bits are
+next sample begins, and a run ends its last step before a jump one clock tick earlier. If that can
+make a difference the last sample is then advanced again, as one that ends so. Hence all bits are
 those of a run over the same samples.
 """
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,8 +24,9 @@ from gms_fsm.coupling.steppable import begin, usable
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.language import EVENT
+from gms_fsm.lowering.generated import reads_time
 from gms_fsm.lowering.pulses import step_times
-from gms_fsm.run.problem import Problem
+from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.settings import Settings
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.signals import Corners, Function
@@ -47,27 +48,18 @@ class SystemSwitch(NamedTuple):
     edge: str
 
 
-class LastSample(NamedTuple):
-    """A sample, and a copy of the state before it."""
-
-    t: float
-    end: float
-    lines: Sequence[float]
-    before: Any
+# A sample: its begin and its end, its inputs at both, and a copy of the state before it.
+LastSample = tuple[float, float, list[float], list[float], Any]
+# Where a system is, besides its memory: the time, the last sample, the switches for which its log
+# had no room, and those in its log that were told with the sample before.
+Standing = tuple[float, LastSample | None, tuple[SystemSwitch, ...], frozenset[SystemSwitch]]
 
 
-class Standing(NamedTuple):
-    """Where a system is, besides its memory."""
-
-    t: float
-    fresh: bool  # no sample yet
-    jumps: bool  # the last sample supposed that inputs jump at its end
-    last: LastSample | None
-    lost: tuple[SystemSwitch, ...]  # those for which the log had no room
+NONE = frozenset[SystemSwitch]()
 
 
 class Plant:
-    """A system in memory; lines are a start and an end for each input, one after the other."""
+    """A system in memory."""
 
     def __init__(
         self,
@@ -80,7 +72,7 @@ class Plant:
         self.system, self.initial, self.settings, self.engine = system, initial, settings, engine
         self.inputs, self.t_start = system.inputs, t
         count = len(self.inputs)
-        self.start = self.started([0.0] * (2 * count))
+        self.start = self.started([0.0] * count)
         kind = BlockMemory if engine == "compiled" else ListMemory
         memory = kind([self.start], waits=True)
         (self.memory,) = memory.each
@@ -90,16 +82,20 @@ class Plant:
         layout = self.start.program.layout
         self.events = {name.removeprefix(EVENT): layout.y.index(name) for name in layout.events}
         self.alone = Alone()
-        self.now = Standing(t, True, False, None, ())
-        self._spare: Any = None
+        self.t, self.lost = t, tuple[SystemSwitch, ...]()
+        self.told = frozenset[SystemSwitch]()
+        self.last: LastSample | None = None
+        self._spare: Any = None  # memory for the next copy
+        self._sees_ends = _sees_ends(self.start)
         self._steps = self.start.program.plan.steps
         self._knots: tuple[float, list[float]] = -np.inf, []  # up to when, and they
+        self._sample.waits = True  # except in a sample without length
 
-    def started(self, lines: Sequence[float], first: int = 0) -> Problem:
+    def started(self, values: Sequence[float]) -> Problem:
         """Return the start of a run in which the inputs have their first values."""
         t, end = begin(self.t_start)
         signals: dict[str, Any] = {
-            name: Corners(np.array([t, end]), np.full(2, lines[2 * k + first]), held=True)
+            name: Corners(np.array([t, end]), np.full(2, values[k]), held=True)
             for k, name in enumerate(self.inputs)
         }
         for name, signal in self.system.signals.items():
@@ -126,103 +122,100 @@ class Plant:
         return dataclasses.replace(start, program=program)
 
     # ------------------------------------------------------------------ samples
-    def commit(self, end: float, lines: Sequence[float]) -> None:
-        """Advance by a sample; if that fails everything is as before."""
-        now = self.now
-        backup = self._copy(self._spare)
+    def commit(self, end: float, first: list[float], last: list[float]) -> None:
+        """Advance by a sample, in which inputs go from first to last; if that fails, stay."""
+        t, before, spare, told = self.t, self.last, self._spare, NONE
+        backup = state = self._copy(spare)
         try:
-            before = self._supposed(now, end, lines, backup)
-            lost = self._advanced(now.t, end, lines, jumps=self.jumped)
-            last = LastSample(now.t, end, lines, before)
-            self.now = Standing(end, False, self.jumped and end > now.t, last, lost)
-            self._spare = None if now.last is None else now.last.before
+            # Of a sample without length only its end matters.
+            if (
+                self._sees_ends
+                and before is not None
+                and before[3] != (first if end > t else last)
+                and before[0] < before[1]
+            ):
+                state, told = self._again(before, backup)
+            lost = self._advanced(t, end, first, last)
+            self._spare = None if before is None else before[4]
+            self.t, self.last, self.lost, self.told = end, (t, end, first, last, state), lost, told
         except BaseException:  # Ctrl-C, too
             self._take(backup)
-            self.now, self._spare = now, None
+            self.t, self.last, self._spare = t, before, None
             raise
 
-    jumped = False  # whether inputs jumped at the beginning of the present sample
+    def _again(self, last: LastSample, now: Any) -> tuple[Any, frozenset[SystemSwitch]]:
+        """Advance by the last sample again, as inputs jump at its end.
 
-    def _supposed(self, now: Standing, end: float, lines: Sequence[float], backup: Any) -> Any:
-        """Return a copy of the state from which a sample begins.
-
-        If inputs jump although the last sample did not suppose it, or the other way round, that is
-        advanced again.
+        Return its end, and what it has told of that comes later now.
         """
-        last = now.last
-        if last is None:
-            self.jumped = False
-            return backup
-        first = 0 if end > now.t else 1  # of a sample without length only its end matters
-        ends, jumped = last.lines, False
-        for k in range(0, len(lines), 2):
-            jumped = jumped or lines[k + first] != ends[k + 1]
-        self.jumped = jumped
-        if jumped == now.jumps or last.end == last.t:
-            return backup
         memory, plan = self.memory.buffers.memory, self.memory.buffers.plan
         if memory.phase == loop.JUMPING and plan.ticks[memory.jump]:
-            return backup  # it waits at a tick in any case
-        self._take(last.before)
-        self._advanced(last.t, last.end, last.lines, jumps=jumped)
-        return self._copy()
+            return now, NONE  # it waits at a tick in any case
+        told = frozenset(self.logged)
+        self._take(last[4])
+        self._advanced(*last[:4], jumps=True)
+        return self._copy(), told.difference(self.logged)
 
     def _advanced(
-        self, t: float, end: float, lines: Sequence[float], *, jumps: bool
+        self, t: float, end: float, first: list[float], last: list[float], *, jumps: bool = False
     ) -> tuple[SystemSwitch, ...]:
         """Advance to the end of a sample; return the switches that did not fit into its log."""
         sample = self._sample
-        sample.end = sample.until = end
-        sample.waits = end > t
-        sample.jumps = jumps and end > t
-        sample.resumed = False
-        k = 0
-        for row in self._rows:
-            row[0], row[1] = lines[k], lines[k + 1]
-            k += 2
-        if self.now.fresh:
-            self._enter(end, lines)
-        lost: list[SystemSwitch] = []
-        if self._steps and end > t:
-            for knot in self.knots(t, end):
-                self._part(knot, lost)
-            self._part(end, lost)
-        elif self._run():
-            self._finish(lost)
-        return tuple(lost)
-
-    def _part(self, end: float, lost: list[SystemSwitch]) -> None:
-        """Advance to a knot within a sample, or to its end."""
-        b, sample = self.memory.buffers, self._sample
-        waits, jumps = sample.waits, sample.jumps
-        if end < sample.until:
-            sample.waits = sample.jumps = False
         sample.end = end
-        if sample.resumed:
-            b.now.pause = end
-            b.plan.knots[0] = end
-            b.out.next_knot = 0
-        if self._run():
-            self._finish(lost)
-        sample.resumed, sample.waits, sample.jumps = True, waits, jumps
+        for k, row in enumerate(self._rows):
+            row[0], row[1] = first[k], last[k]
+        if self.last is None or self._steps or not end > t:
+            return self._unusual(t, end, first, last, jumps)
+        if jumps:
+            sample.jumps = True
+            failed = self._run()
+            sample.jumps = False
+        else:
+            failed = self._run()
+        return self._finished() if failed else ()
 
-    def _finish(self, lost: list[SystemSwitch]) -> None:
-        """Complete a sample that ended early; keep what its log lost; or raise its error."""
-        sample, now = self._sample, self.now.t
+    def _unusual(
+        self, t: float, end: float, first: list[float], last: list[float], jumps: bool
+    ) -> tuple[SystemSwitch, ...]:
+        """Do what `_advanced` does for the first sample, one without length, or one in parts."""
+        sample, b, lost = self._sample, self.memory.buffers, tuple[SystemSwitch, ...]()
+        if b.memory.phase == loop.START:
+            self._enter(first if end > t else last)
+        knots = self.knots(t, end) if self._steps else []
+        sample.until = end
+        for part in (*knots, end):
+            sample.end = part
+            sample.waits = part == end > t
+            sample.jumps = jumps and sample.waits
+            if sample.resumed:
+                b.now.pause = part
+                b.plan.knots[0] = part
+                b.out.next_knot = 0
+            if self._run():
+                lost += self._finished()
+            sample.resumed = True
+        sample.resumed, sample.waits, sample.jumps, sample.until = False, True, False, -LATEST
+        return lost
+
+    def _finished(self) -> tuple[SystemSwitch, ...]:
+        """Complete a sample that ended early; return what its log lost; or raise its error."""
+        sample, lost = self._sample, list[SystemSwitch]()
         while code := sample.code:
             if code != FULL_LOG:
                 machine = self.memory.buffers.memory.machine
                 bank = self.start.program.layout.bank(machine)
                 element = f"contact {bank.name!r}, element {machine - bank.first + 1}"
-                raise failure(self.start, self.memory, code, element, "system", now)
+                raise failure(self.start, self.memory, code, element, "system", self.t)
             lost += self.logged
             sample.switches, sample.resumed = 0, True
             self._run()
+            sample.resumed = False
+        return tuple(lost)
 
-    def _enter(self, end: float, lines: Sequence[float]) -> None:
+    def _enter(self, values: list[float]) -> None:
         """Enter the default states with the first inputs."""
         b: Any = self.memory.buffers
-        start = self.started(lines, 0 if end > b.now.t else 1)
+        start = self.started(values)
         sent = {k: b.now.y[k] for k in self.events.values()}
         b.now.y[:], b.memory.anchor[:] = start.y, start.y
         for place, value in sent.items():
@@ -239,17 +232,18 @@ class Plant:
             self._knots = until, known
         return [knot for knot in known if t < knot < end]
 
-    def peek(self, end: float, lines: Sequence[float], names: Sequence[str]) -> list[float]:
+    def peek(
+        self, end: float, first: list[float], last: list[float], names: Sequence[str]
+    ) -> list[float]:
         """Return values at the end of a sample, and stay."""
-        now, spare = self.now, self._spare
-        backup = self._copy()
+        now, copy, spare = self._standing, self._copy(), self._spare
         try:
             self._spare = None
-            self.commit(end, lines)
+            self.commit(end, first, last)
             return [self.value(name) for name in names]
         finally:
-            self._take(backup)
-            self.now, self._spare = now, spare
+            self._take(copy)
+            self._standing, self._spare = now, spare
 
     def send(self, event: str) -> None:
         """Let an event wait for the next sample."""
@@ -287,7 +281,8 @@ class Plant:
     def names(self) -> list[str]:
         """The names that `value` knows."""
         layout = self.start.program.layout
-        return [*dict.fromkeys([*system_names(self.system), *layout.keys])]
+        more = (key for key, name in layout.keys.items() if name in layout.y.shared)
+        return [*dict.fromkeys([*system_names(self.system), *more])]
 
     def value(self, name: str) -> float:
         """Return the present value of a name."""
@@ -298,7 +293,7 @@ class Plant:
             found = self._place(name)
             self._places[name] = found
         values, k = found
-        if values is None or self.now.fresh:
+        if values is None or self.last is None:
             return self._read(name)
         value: float = values[k]
         return value
@@ -317,24 +312,24 @@ class Plant:
             return _viewed(b.now.y), layout.y.index(here)
         if here in layout.observed.shared:
             return _viewed(self._sample.seen), layout.observed.index(here)
-        if name in self.inputs:
-            return self._rows[self.inputs.index(name)], 1
         return None, 0
 
     def _read(self, name: str) -> float:
         """Return a value as the trace of a run computes it."""
         b, start = self.memory.buffers, self.start
-        shared, own, tables = start.program.p
-        now = [list(map(float, row)) for row in self.memory.tables]
-        program = dataclasses.replace(start.program, p=(shared, own, now or tables))
-        lines = {} if self.now.fresh else dict(zip(self.inputs, self._rows, strict=True))
+        lines = {} if self.last is None else dict(zip(self.inputs, self.last[3], strict=True))
+        if name in lines:
+            return lines[name]
+        shared, own, _ = start.program.p
+        p = shared, own, [[*map(float, row)] for row in self.memory.tables]
+        program = dataclasses.replace(start.program, p=p)
         given = {
-            each: Corners(np.array([-1.0, 0.0]), np.full(2, float(row[1])), held=True)
-            for each, row in lines.items()
+            each: Corners(np.array([-1.0, 0.0]), np.full(2, value), held=True)
+            for each, value in lines.items()
         }
         system = dataclasses.replace(start.system, signals={**start.system.signals, **given})
         y = [*map(float, b.now.y)]
-        scope = SystemScope.of(system, program, self.now.t, y, hybrid.modes_of(b))
+        scope = SystemScope.of(system, program, self.t, y, hybrid.modes_of(b))
         layout = start.program.layout
         if name in layout.y.shared or name in layout.keys:
             return y[layout.y.index(layout.keys.get(name, name))]
@@ -349,41 +344,62 @@ class Plant:
         what = program.source, program.p[:2], options.rtol, options.atol, method, options.step
         return hashlib.sha256(repr(what).encode()).hexdigest(), self.engine
 
+    @property
+    def _standing(self) -> Standing:
+        return self.t, self.last, self.lost, self.told
+
+    @_standing.setter
+    def _standing(self, standing: Standing) -> None:
+        self.t, self.last, self.lost, self.told = standing
+
     def snapshot(self) -> Snapshot:
         """Return the present state."""
-        now = self.now
-        if now.last is not None:  # its memory is used again
-            now = now._replace(last=now.last._replace(before=_copied(now.last.before)))
-        return Snapshot(now.t, self.identity, (self._copy(), now))
+        return Snapshot(self.t, self.identity, (self._copy(), _with(self._standing, _copied)))
 
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot."""
-        copy, now = content_of(snapshot, Snapshot, self.identity)
+        copy, standing = content_of(snapshot, Snapshot, self.identity)
         self._take(copy)
-        if now.last is not None:
-            now = now._replace(last=now.last._replace(before=_copied(now.last.before)))
-        self.now, self._spare = now, None
+        self._standing, self._spare = _with(standing, _copied), None
 
-    def packed(self) -> tuple[dict[str, list[float]], Standing]:
+    def packed(self) -> tuple[Any, Standing]:
         """Return the present state as lists, without addresses in memory."""
-        now = self.now
-        here = _lists(self.memory.whole())
-        if now.last is not None:
-            copy = self._copy()
-            self._take(now.last.before)
-            before = _lists(self.memory.whole())
-            self._take(copy)
-            now = now._replace(last=now.last._replace(before=before))
-        return here, now
+        copy, here = self._copy(), _lists(self.memory.whole())
 
-    def unpack(self, state: tuple[dict[str, list[float]], Standing]) -> None:
+        def listed(before: Any) -> Any:
+            self._take(before)
+            return _lists(self.memory.whole())
+
+        try:
+            return here, _with(self._standing, listed)
+        finally:
+            self._take(copy)
+
+    def unpack(self, state: tuple[Any, Standing]) -> None:
         """Return to what `packed` returned."""
-        here, now = state
-        if now.last is not None:
-            self.memory.put_whole(now.last.before)
-            now = now._replace(last=now.last._replace(before=self._copy()))
+        here, standing = state
+
+        def taken(before: Any) -> Any:
+            self.memory.put_whole(before)
+            return self._copy()
+
+        self._standing = _with(standing, taken)
         self.memory.put_whole(here)
-        self.now, self._spare = now, None
+
+
+def _with(standing: Standing, copied: Callable[[Any], Any]) -> Standing:
+    """Return the same with another copy of the state before the last sample."""
+    t, last, *told = standing
+    return t, None if last is None else (*last[:4], copied(last[4])), *told  # type: ignore[return-value]
+
+
+def _sees_ends(start: Problem) -> bool:
+    """Return whether a run depends on whether inputs jump at the end of a sample.
+
+    That is so if it reads the time, or compares velocities across a jump.
+    """
+    program = start.program
+    return bool(program.velocities or program.lasting) or reads_time(program.source)
 
 
 def _viewed(array: Any) -> Any:

@@ -131,6 +131,30 @@ def standalone(source: str) -> str:
     return "\n".join([head, *parts, "\n" + body.lstrip("\n")])
 
 
+@functools.lru_cache(maxsize=64)
+def reads_time(source: str) -> bool:
+    r"""Return whether generated text reads the time for more than a record's value.
+
+    Examples
+    --------
+    >>> reads_time("def f(t, tables):\n    return piecewise_linear(t, tables[0], tables[1])\n")
+    False
+    >>> reads_time("def f(t):\n    return 2.0 * t\n")
+    True
+    """
+    nodes = [*ast.walk(_tree(source))]
+    records = {
+        node.args[0]
+        for node in nodes
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "piecewise_linear"
+    }
+    return any(
+        isinstance(node, ast.Name) and node.id == "t" for node in nodes if node not in records
+    )
+
+
 def elementary_text(names: Iterable[str]) -> str:
     """Return the text of elementary functions of the language, and of all that they use.
 

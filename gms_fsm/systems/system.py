@@ -370,16 +370,6 @@ class System:
         ------
         ParameterError, SignalError, ExpressionError
             If it has no such input, or it is no signal.
-
-        Examples
-        --------
-        >>> from gms_fsm import Body, Contact, System
-        >>> from gms_fsm.charts import CHARTS
-        >>> pad = Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.0})
-        >>> sled = System("sled", bodies=(Body("sled", inertia=2.0, force="u"),), contacts=(pad,),
-        ...               inputs=("u",))
-        >>> sled.open, sled.with_inputs({"u": "2 * t"}).open
-        (('u',), ())
         """
         given = mapping_of(inputs, "inputs")
         for name in given:

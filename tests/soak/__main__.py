@@ -205,6 +205,7 @@ PARTS = (
     "trials",
     "stepping",
     "systems",
+    "stepped",
     "exact",
     "doubts",
     "verdicts",
@@ -212,7 +213,7 @@ PARTS = (
 )
 COUNTS = {
     "kills": 200, "examples": 300, "transitions": 1_000_000, "trials": 2000, "records": 1000,
-    "systems": 500, "exact": 1000, "doubts": 400, "verdicts": 400,
+    "systems": 500, "stepped": 200, "exact": 1000, "doubts": 400, "verdicts": 400,
     "pairs": 1000,
 }  # fmt: skip
 
@@ -245,6 +246,7 @@ def main() -> None:
     trying = {
         "trials": ("tests.soak.trials", of_each),
         "systems": ("tests.soak.random_systems", str(given.systems)),
+        "stepped": ("tests.soak.stepped_systems", str(given.stepped)),
         "exact": ("tests.soak.exact_systems", str(given.exact)),
         "doubts": ("tests.soak.doubts", str(given.doubts)),
         "verdicts": ("tests.soak.verdicts", str(given.verdicts)),
