@@ -65,6 +65,8 @@ class Format:
     takes : tuple of str
         Which of ``initial``, ``t_start``, ``settings``, ``t_end`` and ``compensator`` it uses;
         `gms_fsm.export` refuses the others.
+    whole : bool
+        Whether it takes systems, too.
 
     Raises
     ------
@@ -81,6 +83,7 @@ class Format:
     usual: bool = False
     words: Collection[str] = ()
     takes: tuple[str, ...] = ()
+    whole: bool = False
 
     def __post_init__(self) -> None:
         for name, known in (("subject", get_args(Written)), ("extra", ("", *EXTRAS))):

@@ -229,9 +229,9 @@ def test_the_only_friction_of_a_scenario_is_exported_where_no_body_can_be(
     gms_fsm: CommandLine,
 ) -> None:
     Path("own.toml").write_text(OPEN_LOOP)
-    done = gms_fsm("export", "own.toml", "--to", "matlab", "-o", "out")
-    assert "note: matlab takes friction only: written is that of own.toml" in done.err
-    assert Path("out/own.m").is_file()
+    done = gms_fsm("export", "own.toml", "--to", "st", "-o", "out")
+    assert "note: st takes friction only: written is that of own.toml" in done.err
+    assert Path("out/own.st").is_file()
 
 
 def test_formats_of_export_are_listed(gms_fsm: CommandLine) -> None:

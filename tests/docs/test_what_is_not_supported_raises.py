@@ -62,7 +62,7 @@ REFUSED: dict[str, list[Callable[[], object]]] = {
             Contact("a", CHARTS["planar-coulomb"], {"F_c": 1.0, "F_s": 2.0, "v_c": 1e-3})
         ),
     ],
-    "Whole systems": [lambda: exported(system(), "matlab")],
+    "Whole systems": [lambda: exported(system(), "st")],
     "Python functions": [lambda: exported(system("f", f=lambda t: t), "c99")],
     "SciPy": [lambda: exported(stick_slip("signed"), "c99", settings=Settings(method=Radau))],
 }

@@ -83,10 +83,10 @@ def model(**parts: Any) -> ChartModel:
     return ChartModel(made, dict.fromkeys(made.parameter_names, 1.0))
 
 
-def system(signal: Any = "0") -> System:
+def system(signal: Any = "0", pad: Any = PAPER) -> System:
     """Return a mass under a force."""
-    body, pad = Body("mass", inertia=1.0, force="f"), Contact("pad", PAPER)
-    return System("driven", bodies=(body,), contacts=(pad,), signals={"f": signal})
+    body, contact = Body("mass", inertia=1.0, force="f"), Contact("pad", pad)
+    return System("driven", bodies=(body,), contacts=(contact,), signals={"f": signal})
 
 
 def push(t: float) -> float:
@@ -133,7 +133,8 @@ ROWS: list[tuple[str, Any, str, str]] = [  # formats, what is given, place, word
     ("c99 fmu2", ChartModel(ENTERED, {}), "contact 'friction'", "v is known"),
     ("fmu2 fmu3", system(push), "signal 'f'", "Python function"),
     ("js", system(push), "signal 'f'", PUSH),
-    ("scxml transitions matlab .mmd", system(), "system 'driven'", "system of bodies"),
+    ("scxml transitions st .mmd", system(), "system 'driven'", "system of bodies"),
+    ("matlab modelica", system(pad=KARNOPP_MODEL), "contact 'pad'", "locks the bodies"),
     # what is not used, or missing
     ("js", system(), "t_end", "needs its end"),
     ("js", system(), "settings", "rows"),

@@ -61,7 +61,7 @@ def export_command(
         )
     given, default, more = _given(name, law, contact)
     contacts: tuple[Contact, ...] = getattr(given, "contacts", ())
-    whole = [each.name for each in known.values() if "settings" in each.takes]
+    whole = [each.name for each in known.values() if each.whole]
     supervisors: tuple[Contact, ...] = getattr(given, "supervisors", ())
     if to in known and to not in whole and supervisors:
         raise ParameterError(
@@ -71,7 +71,6 @@ def export_command(
             advice=f"give one of {', '.join(whole)}, or the chart file of one of them",
         )
     if to in known and to not in whole and len(contacts) == 1:
-        # Only formats that contain the engine take the bodies, too.
         given, _, more = _given(name, law, contacts[0].name)
         note(f"{to} takes friction only: written is that of {name}, with its velocity as an input")
     if to in known:

@@ -56,6 +56,9 @@ log = struct('t', {t_start} + dt * (0:count).');
 y = [{start}];
 w = [{values}];
 s = {{{begin}}};
+for j = 1:{contacts}
+    s{{j}}.tolerance = 1e-8;  % far below the error of a step of the bodies
+end
 F = zeros({contacts}, 1);
 {check}for k = 0:count
     t = log.t(k + 1);

@@ -188,5 +188,6 @@ register(
         c99,
         words=WORDS,
         takes=(*TAKES, "compensator"),
+        whole=True,
     )
 )

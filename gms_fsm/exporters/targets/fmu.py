@@ -218,5 +218,6 @@ for _version in WORDINGS:
             functools.partial(fmu, version=_version, describe=_files),
             words=WORDS,
             takes=TAKES,
+            whole=True,
         )
     )

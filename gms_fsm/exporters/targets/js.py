@@ -502,5 +502,6 @@ register(
         "gms-fsm",
         js,
         takes=("initial", "t_start", "settings", "t_end"),
+        whole=True,
     )
 )

@@ -544,5 +544,6 @@ register(
         matlab,
         words=WORDS,
         takes=("initial", "t_start"),
+        whole=True,
     )
 )

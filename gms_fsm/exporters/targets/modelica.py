@@ -414,5 +414,6 @@ register(
         modelica,
         words=WORDS,
         takes=("initial", "t_start"),
+        whole=True,
     )
 )
