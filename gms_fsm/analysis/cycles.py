@@ -270,9 +270,10 @@ def _newton(A: FloatArray, R: FloatArray, along: FloatArray | None) -> tuple[Flo
         found: FloatArray = np.linalg.lstsq(A - eye, -R, rcond=None)[0]
         return found, 0.0
     size = float(np.linalg.norm(along)) or 1.0
-    matrix = np.block([[A - eye, along[:, None] / size], [along[None, :] / size, np.zeros((1, 1))]])
-    step = np.asarray(np.linalg.lstsq(matrix, np.append(-R, 0.0), rcond=None)[0], dtype=np.float64)
-    return step[:-1], float(step[-1]) / size
+    unit = along[:, None] / size
+    matrix = np.block([[A - eye, unit], [unit.T, np.zeros((1, 1))]])
+    whole = np.linalg.lstsq(matrix, np.append(-R, 0.0), rcond=None)[0]
+    return np.array(whole[:-1], dtype=np.float64), float(whole[-1]) / size
 
 
 def _multipliers(A: FloatArray, along: FloatArray | None) -> NDArray[np.complex128]:

@@ -98,9 +98,9 @@ class Arcs:
         def flow(t, y, _, held, p, dy, t_t, y_t, p_t, dy_t):  # type: ignore[no-untyped-def]
             del p
             y_t = np.array(y_t)[:, None]
-            f, slope, _, _ = along(t, y, mode, held, np.array([t_t]), y_t, [p_t])
-            dy[:] = f.tolist()
-            dy_t[:] = slope[:, 0].tolist()
+            slide = along(t, y, mode, held, np.array([t_t]), y_t, [p_t])
+            dy[:] = slide.f.tolist()
+            dy_t[:] = slide.slope[:, 0].tolist()
 
         return flow
 
@@ -178,6 +178,7 @@ def _translated(arcs: Arcs) -> tuple[Any, Any]:
     size, column = program.layout.y.size, OuterArray
     shared, own, _ = packed(program.p)
     example = arcs._python._replace(
+        flow=arcs.linear.functions["plain flow"],
         p=(shared, own, column(table=True)),
         moves=column(table=True),
         held=[0.0] * program.held,

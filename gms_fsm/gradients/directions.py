@@ -41,8 +41,17 @@ def directions_of(
         number = number_of(what, name)
         label = label_in(what, number.whole)
         scales[c] = abs(number.value) or 1.0
-        if label in shared:
-            row = changes.setdefault(shared.index(label), np.zeros(len(given)))
+        place = shared.index(label) if label in shared else -1
+        read = f"shared[{place}]" in program.source
+        if label not in (*shared, *own) or (number.value == 0.0 and place >= 0 and not read):
+            raise ParameterError(
+                f"with this value {name!r} is a part of the program's text, not one of its numbers",
+                place="sensitivities",
+                value=name,
+                advice="leave it out, or give it another value",
+            )
+        if place >= 0:
+            row = changes.setdefault(place, np.zeros(len(given)))
             row[c] = 1.0
             continue
         k = own.index(label)

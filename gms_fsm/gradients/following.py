@@ -26,7 +26,7 @@ from gms_fsm.gradients.linear import Directions, Linear
 from gms_fsm.language import comparisons, split
 from gms_fsm.lowering.program import Program, equations
 from integrators import Arc, Firing, Held, LoopOptions, Slide, Stop, hybrid
-from integrators.advance import CROSSED, REACHED, raise_floor
+from integrators.advance import CROSSED, REACHED, raise_floor, tick_at
 from integrators.crossings import any_changed, listed
 from integrators.sliding import margins_on
 from integrators.steps import time_of
@@ -34,6 +34,8 @@ from integrators.steps import time_of
 Modes = tuple[int, ...]
 ALIKE = 1e-7  # times of switches that differ by less have one derivative
 ROUNDING = 1e-12  # of the length of a run
+SHORT = 64.0  # ticks: an arc that a switch has ended at once
+NOTHING = 1e-9  # of the natural size of a margin's derivative
 GRAZING = 1e-5  # of the mean rate of a margin over its last step
 
 
@@ -195,6 +197,7 @@ class Follower:
         self.times: list[FloatArray] = []
         self.doubts: list[DerivativeDoubt] = []
         self.at_instant = True
+        self.settled = -np.inf, np.zeros(directions.count)  # the last instant, and how it moves
         self.crossing: _Crossing | None = None
         self.waiting: list[tuple[int, list[float], Modes]] = []  # rows of this instant
         self.taken = 0  # of the requested times
@@ -339,9 +342,14 @@ class Follower:
         total, t_t = after[-1]
         signs = self.linear.armed(self.t, self.y, self.mode) if held is None else held
         self.S = self.fixed(self.y, self.mode, signs, total, t_t)
+        self.S = self.linear.onto(self.t, self.y, self.mode, signs, self.S)
+        if self.program.velocities:  # what locks hold is not free
+            states = (self.t, list(self.y), list(self.mode), list(signs), self.program.p)
+            self.S = self.linear.call("follow", states, np.zeros(self.S.shape[1]), self.S)[1]
         self.switch.done.clear()
         self.waiting.clear()
         self.crossing, self.at_instant = None, False
+        self.settled = self.t, t_t
 
     def fixed(
         self, y: list[float], mode: Modes, held: list[float], total: FloatArray, t_t: FloatArray
@@ -368,8 +376,28 @@ class Follower:
         f = self.rate(c.y, c.mode, c.held)
         none = np.zeros(self.S.shape[1])
         t_t, rates = self.instants(c.relations, c.y, c.mode, c.held, f, self.S, none)
-        self.check(c, t_t, rates)
+        if c.t - self.settled[0] <= SHORT * tick_at(c.t):
+            self.at_once(c, t_t, rates)
+        else:
+            self.check(c, t_t, rates)
         return self.S + f[:, None] * t_t[0], t_t[0]
+
+    def at_once(self, c: _Crossing, t_t: FloatArray, rates: FloatArray) -> None:
+        """Let what changes right after a switch, because of it, change with it.
+
+        Its margin is zero at that switch, also after a change of the numbers. From there it may
+        grow as the square of the time, so that its rate says nothing.
+        """
+        _, before = self.settled
+        still = np.zeros(len(c.y))
+        places = [self.place(r) for r in c.relations]
+        _, slopes = self.linear.margins(
+            places, c.t, c.y, c.mode, c.held, still, np.diag(self.size), [self.linear.numbers[-1]]
+        )
+        natural = np.abs(slopes).sum(axis=1)[:, None] / self.directions.scales
+        left = np.abs(rates[:, None] * (before - t_t))
+        same = ~(left > NOTHING * natural)
+        t_t[same] = np.broadcast_to(before, t_t.shape)[same]
 
     def instants(
         self,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,6 +51,17 @@ class Directions:
     def count(self) -> int:
         """Number of directions."""
         return len(self.names)
+
+
+class _Slide(NamedTuple):
+    """A motion along surfaces."""
+
+    f: FloatArray  # dy/dt
+    slope: FloatArray  # its tangents
+    sigma: FloatArray
+    d_sigma: FloatArray
+    N: FloatArray  # the gradients of the surfaces
+    H: FloatArray  # half the differences of the flows on both sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,8 +161,8 @@ class Linear:
         if not any(flags):
             plain, slope = self._plain(t, y, list(mode), held, t_t, y_t)
             return np.array(plain), slope
-        f, slope, _, _ = self.along(t, y, mode, held, t_t, y_t)
-        return f, slope
+        slide = self.along(t, y, mode, held, t_t, y_t)
+        return slide.f, slide.slope
 
     def _plain(
         self,
@@ -175,7 +186,7 @@ class Linear:
         t_t: FloatArray,
         y_t: Any,
         p_t: list[Any] | None = None,
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    ) -> _Slide:
         """Return the slope along surfaces, as `integrators.sliding` has it, and the sigmas."""
         program, modes, signs = self.program, list(mode), list(held)
         surfaces, size = program.surfaces, len(y)
@@ -217,7 +228,21 @@ class Linear:
             sigma, d_sigma = np.full(len(which), np.nan), np.full((len(which), t_t.size), np.nan)
         f = f + sigma @ H
         slope = slope + np.einsum("cp,cj->jp", d_sigma, H) + np.einsum("c,cjp->jp", sigma, dH)
-        return f, slope, sigma, d_sigma
+        return _Slide(f, slope, sigma, d_sigma, N[:, :-1], H)
+
+    def onto(
+        self, t: float, y: list[float], mode: Modes, held: list[float], S: FloatArray
+    ) -> FloatArray:
+        """Return tangents on the surfaces slid on: what leads off them has come back at once."""
+        program, still = self.program, np.zeros(S.shape[1])
+        which = np.flatnonzero(mode[program.layout.slides]).tolist()
+        if not which:
+            return S
+        slide = self.along(t, y, mode, held, still, S)
+        above = [program.surfaces.above[k] for k in which]
+        _, off = self.margins(above, t, y, mode, held, still, S)
+        back: FloatArray = slide.H.T @ np.linalg.lstsq(slide.N @ slide.H.T, off, rcond=None)[0]
+        return S - back
 
     # ------------------------------------------------------------------ switches
     def armed(self, t: float, y: list[float], mode: Modes) -> list[float]:
@@ -233,9 +258,11 @@ class Linear:
         held: list[float],
         t_t: FloatArray,
         y_t: FloatArray,
+        p_t: list[Any] | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Return the margins of relations, and of the sigma that ends a slide; their tangents."""
         program, own = self.program, len(self.program.strict)
+        every = None if p_t is None else p_t * t_t.size
         watch = [0] * own
         for r in relations:
             if r < own:
@@ -243,9 +270,10 @@ class Linear:
         arguments = (t, y, list(mode), program.p, watch)
         values, slopes = [0.0] * own, np.zeros((own, t_t.size))
         if any(watch):
-            values, slopes = self.call("margins", arguments, t_t, y_t, own)
+            values, slopes = self.call("margins", arguments, t_t, y_t, own, every)
         if max(relations) >= own:
-            _, _, sigma, d_sigma = self.along(t, y, mode, held, t_t, y_t)
+            slide = self.along(t, y, mode, held, t_t, y_t, every)
+            sigma, d_sigma = slide.sigma, slide.d_sigma
         g, g_t = [], []
         for r in relations:
             if r < own:
@@ -268,7 +296,8 @@ class Linear:
             arguments = (t, y, modes, program.live, program.p)
             return self.call("observe", arguments, t_t, y_t, size)[1]
         surfaces, held = program.surfaces, self.armed(t, y, mode)
-        _, _, sigma, d_sigma = self.along(t, y, mode, held, t_t, y_t)
+        slide = self.along(t, y, mode, held, t_t, y_t)
+        sigma, d_sigma = slide.sigma, slide.d_sigma
         which, signs = np.flatnonzero(flags).tolist(), list(program.live)
         for k in which:
             if surfaces.machine[k] < 0:

@@ -19,7 +19,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.language import derivative, names_in, parse_value, spell
 from gms_fsm.language.tree import Number, Value
-from gms_fsm.lowering.generated import SIGNALS, load
+from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful
 from gms_fsm.lowering.program import Program
 
 MARK = "d__"  # before the name of a value: its tangent
@@ -44,7 +44,7 @@ class Places:
 
 
 def tangents(program: Program, active: Places) -> Mapping[str, Any]:
-    """Return the functions of a program with tangents, and ``"text"``, their text.
+    """Return the functions of a program with tangents, their ``"text"``, and the ``"plain flow"``.
 
     Each takes its own arguments, and then the tangents of t, y, the numbers (shared, own), and of
     what it fills: ``flow(t, y, mode, held, p, dy, dt, y_t, p_t, dy_t)``.
@@ -74,8 +74,9 @@ def tangents(program: Program, active: Places) -> Mapping[str, Any]:
 @functools.lru_cache(maxsize=64)
 def _made(_: ByIdentity[Any], source: str, title: str, active: Places) -> Mapping[str, Any]:
     text = with_tangents(source, active)
-    namespace = load(title, text, SIGNALS)
-    return {name: namespace[name] for name in FUNCTIONS} | {"text": text}
+    fast, careful = load(title, text, SIGNALS), load_careful(title, text, SIGNALS)
+    functions = {name: ieee(fast[name], careful[name]) for name in FUNCTIONS}
+    return functions | {"text": text, "plain flow": fast["flow"]}
 
 
 def with_tangents(source: str, active: Places, names: Iterable[str] = FUNCTIONS) -> str:
@@ -241,7 +242,7 @@ class _Atoms(ast.NodeTransformer):
                 d_base, d_power = (self.writer.tangent(each) for each in parts)
                 if d_power != ZERO:
                     d_log = f"({power}) / ({base}) * {d_base} + log({base}) * {d_power}"
-                    return self.atom(text, f"({text} * ({d_log}))")
+                    return self.atom(text, f"({text} * ({d_log}) if {base} > 0.0 else 0.0)")
         node.args = [self.visit(each) for each in parts]
         return node
 
