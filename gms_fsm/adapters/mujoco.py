@@ -18,6 +18,7 @@ from gms_fsm.systems.system import Contact
 __all__ = ["JointFriction", "JointSwitch"]
 
 _Callback: TypeAlias = Callable[[Any, Any], object]
+_Sample: TypeAlias = tuple[float, list[float], list[Mapping[str, float]]]  # t, velocities, inputs
 
 
 class JointSwitch(NamedTuple):
@@ -27,6 +28,11 @@ class JointSwitch(NamedTuple):
     joint: str
     element: int
     edge: str
+
+
+def _lines(begin: Mapping[str, float], end: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Return inputs as straight lines; one that is not known before begins as it ends."""
+    return {name: (begin.get(name, value), value) for name, value in end.items()}
 
 
 class JointFriction:
@@ -53,6 +59,10 @@ class JointFriction:
     frictions : mapping of str to Model or Contact
         By the names of hinges and slides. In a slide, friction is in N and m/s. In a hinge it is in
         Nm and rad/s: every N of its parameters is read as Nm and every m as rad.
+    inputs : mapping of str to callable, optional
+        By the names of joints whose friction has further inputs, such as a load or a temperature:
+        a function of the data that returns their values by name. They are straight lines within a
+        time step, as the velocity is.
     rtol : float
         Relative tolerance of the deflections within a time step.
     engine : {"compiled", "ifelse"}, optional
@@ -88,6 +98,7 @@ class JointFriction:
         data: Any,
         frictions: Mapping[str, Model | Contact],
         *,
+        inputs: Mapping[str, Callable[[Any], Mapping[str, float]]] | None = None,
         rtol: float = 1e-6,
         engine: str | None = None,
     ) -> None:
@@ -105,6 +116,10 @@ class JointFriction:
                 "it is empty", place="frictions", advice="give {'name of a joint': friction}"
             )
         self._dofs = [self._dof(name) for name in self._frictions]
+        self._given = dict(checked_kind("inputs", inputs or {}, Mapping, "a mapping"))
+        for name in self._given:
+            if name not in self._frictions:
+                raise unknown("joint", name, self._frictions, place="inputs")
         self._settings: dict[str, Any] = {"rtol": rtol, "engine": engine}
         self._active = False
         self._previous: _Callback | None = None
@@ -131,23 +146,32 @@ class JointFriction:
         for name, friction in self._frictions.items():
             try:
                 stepper = FrictionState(friction, t=t, **self._settings)
-                if stepper.inputs:
+                if stepper.inputs and name not in self._given:
                     raise ParameterError(
                         f"it needs the inputs {', '.join(stepper.inputs)}",
-                        advice="write them as numbers: a joint gives its velocity only",
+                        advice="give inputs={joint: function of the data}, or write them as "
+                        "numbers: a joint gives its velocity only",
                     )
             except GMSError as error:
                 raise error.inside(f"joint {name!r}") from None
             self._steppers.append(stepper)
         self._t = t  # of the last sample that was committed
-        self._v = self._velocities()
-        self._seen = t, self._v  # by the last call
+        self._v, self._u = self._velocities(), self._inputs()
+        self._seen = t, self._v, self._u  # by the last call
         self._forces = [0.0] * len(self._dofs)
         self._switches: list[JointSwitch] = []
 
     def _velocities(self) -> list[float]:
         qvel = self.data.qvel
         return [float(qvel[dof]) for dof in self._dofs]
+
+    def _inputs(self) -> list[Mapping[str, float]]:
+        """Return what each friction reads besides its velocity."""
+        found = []
+        for name in self._frictions:
+            values = self._given[name](self.data) if name in self._given else {}
+            found.append(checked_kind(f"inputs[{name!r}]", values, Mapping, "a mapping"))
+        return found
 
     # ------------------------------------------------------------------ the block
     def __enter__(self) -> Self:
@@ -180,39 +204,39 @@ class JointFriction:
             self._previous(model, data)
         if data is not self.data:
             return
-        t, v = self._arrive()
+        t, v, u = self._arrive()
         dt, forces, qfrc = t - self._t, self._forces, data.qfrc_passive
         for i, dof in enumerate(self._dofs):
-            forces[i] = self._steppers[i].peek(self._v[i], v[i], dt)
+            forces[i] = self._steppers[i].peek(self._v[i], v[i], dt, **_lines(self._u[i], u[i]))
             qfrc[dof] -= forces[i]
 
-    def _arrive(self) -> tuple[float, list[float]]:
-        """Commit what lies before the present step, and return time and velocities."""
+    def _arrive(self) -> _Sample:
+        """Commit what lies before the present step, and return time, velocities and inputs."""
         t = self.data.time
         if t < self._t:
             self._start_over(t)
-        v, latest = self._velocities(), self._seen
+        v, u, latest = self._velocities(), self._inputs(), self._seen
         if t > self._t + self.model.opt.timestep and self._t < latest[0] < t:
             self._commit(*latest)
         if t == self._t:  # a velocity may be set before the first step, or by an impact
-            self._v = v
-        self._seen = t, v
-        return t, v
+            self._v, self._u = v, u
+        self._seen = t, v, u
+        return self._seen
 
-    def _commit(self, t: float, v: list[float]) -> None:
+    def _commit(self, t: float, v: list[float], u: list[Mapping[str, float]]) -> None:
         for i, (name, stepper) in enumerate(zip(self._frictions, self._steppers, strict=True)):
-            stepper.advance_to(self._v[i], v[i], t)
+            stepper.advance_to(self._v[i], v[i], t, **_lines(self._u[i], u[i]))
             self._switches += [
                 JointSwitch(each.t, name, each.element, each.edge) for each in stepper.switches
             ]
-        self._t, self._v = t, v
+        self._t, self._v, self._u = t, v, u
 
     def _catch_up(self) -> None:
         """Commit up to the present time of the data."""
         if self._active:
-            t, v = self._arrive()
+            t, v, u = self._arrive()
             if t > self._t:
-                self._commit(t, v)
+                self._commit(t, v, u)
 
     # ------------------------------------------------------------------ what it found
     @property
@@ -252,7 +276,7 @@ class JointFriction:
         """
         self._catch_up()
         parts = [stepper.snapshot() for stepper in self._steppers]
-        content = list(self._v), parts, list(self._switches), list(self._forces)
+        content = list(self._v), list(self._u), parts, list(self._switches), list(self._forces)
         return Snapshot(self._t, self._identity, content)
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -268,9 +292,9 @@ class JointFriction:
         ParameterError
             If it is of other joints or frictions; the state stays as it was.
         """
-        v, parts, switches, forces = content_of(snapshot, Snapshot, self._identity)
+        v, u, parts, switches, forces = content_of(snapshot, Snapshot, self._identity)
         t = snapshot.t
         for stepper, part in zip(self._steppers, parts, strict=True):
             stepper.restore(part)
-        self._t, self._v, self._seen = t, list(v), (t, list(v))
+        self._t, self._v, self._u, self._seen = t, list(v), list(u), (t, list(v), list(u))
         self._switches, self._forces = list(switches), list(forces)

@@ -122,7 +122,7 @@ class BenchMotion:
     """What pushes and pulls the slider.
 
     ``force + (vibration + growth * t) * sin(omega * (t - start))`` pushes it; a drive that moves
-    with ``velocity + swing * cos(omega * t)`` pulls it through a spring and a damper.
+    with ``velocity * (1 + swing * cos(omega * t))`` pulls it through a spring and a damper.
 
     Parameters
     ----------
@@ -135,11 +135,13 @@ class BenchMotion:
     velocity : sequence of (float, float)
         Corners of the drive's velocity: time [s] and m/s.
     swing : float
-        Amplitude of a cosine added to it, m/s.
+        Amplitude of a cosine in it, as a share.
     omega : float
         Angular frequency, rad/s.
     spring, damper : float
         Between drive and slider, N/m and Ns/m.
+    rest : float
+        For how long the slider rests before time 0, s.
     """
 
     force: Ramps = FLAT
@@ -151,6 +153,7 @@ class BenchMotion:
     omega: float = 0.0
     spring: float = 0.0
     damper: float = 0.0
+    rest: float = 0.0
 
 
 def fastest_engine() -> str:
@@ -181,7 +184,7 @@ def run(
     system = System(
         "bench",
         bodies=(
-            Body("drive", velocity="v_0 + v_1 * cos(w * t)", x="x_d", v="v_d"),
+            Body("drive", velocity="v_0 * (1 + v_1 * cos(w * t))", x="x_d", v="v_d"),
             Body("slider", inertia="m", force=f"{push} + K * (x_d - x) + D * (v_d - v)"),
         ),
         contacts=(contact,),
@@ -191,6 +194,7 @@ def run(
     options: dict[str, Any] = {} if t_eval is None else {"t_eval": np.asarray(t_eval)}
     if motion.omega > 0.0:  # a locked slider has no motion from which steps could be chosen
         options["max_step"] = 2 * math.pi / motion.omega / POINTS
+    options["t_start"] = -motion.rest
     # The slider's own scales: a chart such as modelica has none for a v that has just left 0.
     scales = {"x": bench.rtol * bench.bristle, "v": bench.rtol * bench.v_s}
     options |= {"rtol": bench.rtol, "atol": scales}

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 MEAN, SWING = 1.5, 1.0  # in v_s
 OMEGAS = (1.0, 10.0, 25.0)  # rad/s
 SETTLED = 1.0  # s
+# s before sliding, as some models have a friction that grows with the time at rest. It ends at
+# t = 0, where times are finest: a rest makes some equations stiff.
+REST = 10.0
 SPEEDS = (100.0, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)  # in v_s
 TRAVEL, SHORTEST = 20.0, 0.5  # of each speed: F_s / sigma_0, and s
 PULLED = 40.0  # s
@@ -35,14 +38,14 @@ def _stiff(bench: Bench, **options: object) -> BenchMotion:
 
 def _lag(specimen: Specimen) -> PhenomenonResult:
     bench = specimen.bench
-    mean, swing = MEAN * bench.v_s, SWING * bench.v_s
+    mean = MEAN * bench.v_s
     widths, curves = [], []
     for omega in OMEGAS:
         period = 2 * math.pi / omega
         end = period * (math.ceil(SETTLED / period) + 1)
         times = np.linspace(end - period, end, 401)  # from top speed to top speed
-        base = ((0.0, 0.0), (0.01, mean), (1.0, mean))
-        motion = _stiff(bench, velocity=base, swing=swing, omega=omega)
+        base = ((-REST, 0.0), (0.0, 0.0), (0.01, mean), (1.0, mean))
+        motion = _stiff(bench, velocity=base, swing=SWING / MEAN, omega=omega, rest=REST)
         trace = specimen.run(motion, end, times)
         slower, faster = slice(0, 201), slice(200, 401)
         down = float(np.interp(-mean, -trace.v[slower], trace.F[slower]))
@@ -68,14 +71,14 @@ def _lag(specimen: Specimen) -> PhenomenonResult:
 def _stribeck(specimen: Specimen) -> PhenomenonResult:
     bench = specimen.bench
     speeds = np.array(SPEEDS) * bench.v_s
-    corners: list[tuple[float, float]] = [(0.0, 0.0)]
+    corners: list[tuple[float, float]] = [(-REST, 0.0), (0.0, 0.0)]
     ends, t = [], 0.0
     for speed in speeds.tolist():
         corners.append((t + 0.1 * SHORTEST, speed))
         t += 0.1 * SHORTEST + max(SHORTEST, TRAVEL * bench.bristle / speed)
         corners.append((t, speed))
         ends.append(t)
-    trace = specimen.run(_stiff(bench, velocity=corners), ends[-1], np.array(ends))
+    trace = specimen.run(_stiff(bench, velocity=corners, rest=REST), ends[-1], np.array(ends))
     v, F = trace.v[::-1], trace.F[::-1]
     lowest = int(F.argmin())
     fall = float(F[0] - F[lowest])
@@ -166,8 +169,8 @@ PHENOMENA = (
         "lag",
         "Frictional lag",
         "frictional lag: width at 25 rad/s",
-        "The speed is 1e-3 (1.5 + cos w t) m/s. Measured is the friction while the speed rises "
-        "minus that while it falls, at the mean speed, for w = 1, 10 and 25 rad/s.",
+        "After 10 s at rest the speed is 1e-3 (1.5 + cos w t) m/s. Measured is the friction while "
+        "the speed rises minus that while it falls, at the mean speed, for w = 1, 10 and 25 rad/s.",
         ("$v$ [mm/s]", "friction [N]"),
         _lag,
         decimals=1,
@@ -177,8 +180,8 @@ PHENOMENA = (
         "stribeck",
         "Friction at steady speed",
         "Stribeck curve: fall of friction",
-        "The slider moves at fourteen constant speeds from 0.1 m/s down to 1e-5 m/s. Measured is "
-        "the fall of the friction from the lowest speed to its minimum.",
+        "After 10 s at rest the slider moves at fourteen constant speeds from 0.1 m/s down to 1e-5 "
+        "m/s. Measured is the fall of the friction from the lowest speed to its minimum.",
         ("$v$ [mm/s]", "friction [N]"),
         _stribeck,
         log=True,

@@ -40,6 +40,23 @@ def work(force: FloatArray, x: FloatArray) -> float:
     return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(x)))
 
 
+def _slid_away(
+    specimen: Specimen, way: ForcePath, trace: Trace, verdict: Verdict
+) -> PhenomenonResult:
+    """Return the result of a slider that slides away, up to there: how far it gets says nothing."""
+    limit = SLIDING * specimen.bench.bristle
+    x, applied = trace.x, way.force(trace.t)
+    moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)
+    end = int(np.argmax(moved > limit)) + 1
+    numbers = (
+        MeasuredNumber("force at which it slides away", float(applied[end - 1]), "N"),
+        MeasuredNumber("stroke up to which it would be pre-sliding", 1e6 * limit, "µm"),
+    )
+    curves = (Curve("", 1e6 * x[:end], applied[:end]),)
+    said = "it slides away although the break-away force is not reached"
+    return PhenomenonResult(verdict, numbers, said, curves, AWAY)
+
+
 def _hysteresis(specimen: Specimen) -> PhenomenonResult:
     force = specimen.break_away
     way = path(RATE * force, [each * force for each in OUTER], HOLD)
@@ -52,12 +69,10 @@ def _hysteresis(specimen: Specimen) -> PhenomenonResult:
     stroke = float(max(down.max(), up.max()) - min(down.min(), up.min()))
     loss = work(load, down) + work(back, up)
     share = abs(width) / stroke if stroke > 0.0 else 0.0
-    slides = stroke > SLIDING * specimen.bench.bristle
-    if slides:
-        verdict: Verdict = "shows wrongly"
-        said = "it slides away although the break-away force is not reached"
-    elif share <= LIMITS["hysteresis.width"].value:
-        verdict = "does not show"
+    if stroke > SLIDING * specimen.bench.bristle:
+        return _slid_away(specimen, way, trace, "shows wrongly")
+    if share <= LIMITS["hysteresis.width"].value:
+        verdict: Verdict = "does not show"
         said = "force and displacement are on one line" if stroke > 0.0 else "it does not move"
     elif width < 0.0:
         verdict, said = "shows wrongly", "the loop is run through the wrong way: it makes energy"
@@ -70,7 +85,7 @@ def _hysteresis(specimen: Specimen) -> PhenomenonResult:
         MeasuredNumber("energy lost per cycle", 1e6 * loss, "µJ"),
     )
     curves = (Curve("", 1e6 * trace.x, applied),)
-    return PhenomenonResult(verdict, numbers, said, curves, AWAY if slides else "")
+    return PhenomenonResult(verdict, numbers, said, curves)
 
 
 def nested(specimen: Specimen) -> tuple[ForcePath, Trace]:
@@ -94,10 +109,10 @@ def _memory(specimen: Specimen) -> PhenomenonResult:
     open_by, wide = (abs(u / stroke) if stroke else 0.0 for u in (gap, width))
     instead = ""
     if abs(stroke) > SLIDING * specimen.bench.bristle:
+        return _slid_away(specimen, way, trace, "does not show")
+    if wide <= LIMITS["memory.width"].value and open_by <= LIMITS["memory.gap"].value:
         verdict: Verdict = "does not show"
-        instead, said = AWAY, "it slides away although the break-away force is not reached"
-    elif wide <= LIMITS["memory.width"].value and open_by <= LIMITS["memory.gap"].value:
-        verdict, instead = "does not show", NO_LOOP
+        instead = NO_LOOP
         said = "there is no inner loop" if stroke > 0.0 else "it does not move"
     elif open_by > LIMITS["memory.gap"].value:
         verdict, said = "does not show", "the inner loop does not close: it forgets where it turned"
