@@ -19,7 +19,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.language import derivative, names_in, parse_value, spell
 from gms_fsm.language.tree import Number, Value
-from gms_fsm.lowering.generated import SIGNALS, ieee, load, load_careful
+from gms_fsm.lowering.generated import SIGNALS, CarefulText, ieee, load
 from gms_fsm.lowering.program import Program
 
 MARK = "d__"  # before the name of a value: its tangent
@@ -74,7 +74,7 @@ def tangents(program: Program, active: Places) -> Mapping[str, Any]:
 @functools.lru_cache(maxsize=64)
 def _made(_: ByIdentity[Any], source: str, title: str, active: Places) -> Mapping[str, Any]:
     text = with_tangents(source, active)
-    fast, careful = load(title, text, SIGNALS), load_careful(title, text, SIGNALS)
+    fast, careful = load(title, text, SIGNALS), CarefulText(title, text, SIGNALS)
     functions = {name: ieee(fast[name], careful[name]) for name in FUNCTIONS}
     return functions | {"text": text, "plain flow": fast["flow"]}
 
