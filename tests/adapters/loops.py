@@ -7,15 +7,18 @@ from typing import Any
 import numpy as np
 
 from gms_fsm import (
+    Body,
     Chart,
     Contact,
     Parameter,
     PulledSlider,
     State,
+    System,
     Trace,
     simulate,
 )
 from gms_fsm.app.scenario import load_system
+from gms_fsm.charts import CHARTS
 from tests.helpers import FASTEST, pulled_mass
 
 m_m, m_l, k_s, d_s = 0.5, 1.0, 2e4, 5.0  # kg, kg, N/m, Ns/m
@@ -200,3 +203,10 @@ def exact_pulled_mass(t_end: float = PULLED_END) -> Trace:
     model, _ = pulled_mass()
     rig = PulledSlider(1.0, 2.0, 0.1)
     return simulate(model, rig, t_end, engine=FASTEST, rtol=1e-10, atol=1e-13)
+
+
+def sled(inputs: tuple[str, ...] = ("u",)) -> System:
+    """Return a mass on a dry contact, pushed by an input."""
+    pad = Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.5})
+    body = Body("sled", inertia=1.0, force="u")
+    return System("sled", bodies=(body,), contacts=(pad,), inputs=inputs)

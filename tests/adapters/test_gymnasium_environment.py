@@ -10,13 +10,13 @@ import pytest
 
 from gms_fsm import Slider, simulate
 from gms_fsm.errors import ParameterError
-from tests.adapters.loops import loaded_pad
+from tests.adapters.loops import loaded_pad, sled
 from tests.helpers import pulled_mass
 
 gymnasium = pytest.importorskip("gymnasium", reason="the environment is extra gymnasium")
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
-from gms_fsm.adapters.gymnasium import FrictionPositioning  # noqa: E402
+from gms_fsm.adapters.gymnasium import FrictionPositioning, SystemTask  # noqa: E402
 
 SIZES: dict[str, Any] = {"mass": 1.0, "force": 5.0, "travel": 1.0}
 
@@ -101,3 +101,68 @@ def test_wrong_actions_and_targets_change_nothing() -> None:
 def test_a_friction_with_further_inputs_is_refused() -> None:
     with pytest.raises(ParameterError, match="it needs the inputs load; write them as numbers"):
         FrictionPositioning(loaded_pad(), **SIZES)
+
+
+# --------------------------------------------------------------------------- a whole system
+def task(**changed: Any) -> SystemTask:
+    given: dict[str, Any] = {
+        "actions": {"u": 5.0},
+        "observed": {"goal": 1.0, "x": 2.0, "v": 9.0},
+        "reward": "-abs(goal - x) - 0.01 * u**2",
+        "drawn": {"goal": (-0.8, 0.8)},
+        "ends": "abs(x) > 1",
+        "period": 0.05,
+        "duration": 2.0,
+    }
+    return SystemTask(sled(("u", "goal")), **given | changed)
+
+
+def test_the_checker_accepts_a_system() -> None:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*alternative render modes")
+        check_env(task())
+
+
+def test_a_system_moves_as_simulate_says() -> None:
+    env, levels = task(), [0.2, 0.4, -0.1, -0.5, 0.3]
+    env.reset(options={"goal": 0.5})
+    seen = [env.step(np.array([each])) for each in levels]
+    t = np.repeat(np.cumsum([0.0, *[0.05] * 5]), 2)[1:-1]
+    record = t, 5.0 * np.repeat(levels, 2)
+    trace = simulate(sled(("u", "goal")), t[-1], inputs={"u": record, "goal": 0.5})
+    observation, reward, *_, info = seen[-1]
+    x, v = trace.body("sled").x[-1], trace.body("sled").v[-1]
+    assert observation.tolist() == [0.5, x, v]
+    assert reward == -abs(0.5 - x) - 0.01 * 1.5**2
+    assert [each.edge for *_, each in seen for each in each["switches"]] == list(
+        trace.transitions.edge
+    )
+    assert info["t"] == t[-1]
+
+
+def test_an_episode_ends() -> None:
+    env = task(initial={"sled.v": 8.0, "states": ["forward"]})
+    env.reset(seed=1)
+    over = [env.step(np.array([1.0]))[2:4] for _ in range(40)]
+    assert over[2] == (True, False)
+    assert over[-1] == (True, True)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"actions": {}}, {"actions": {"w": 1.0}}, {"drawn": {}}, {"observed": {"y": 1.0}},
+     {"period": 0.0}, {"observed": {"x": -1.0}}],
+)  # fmt: skip
+def test_a_wrong_task_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ParameterError):
+        task(**wrong)
+
+
+@pytest.mark.parametrize(
+    "call", [lambda env: env.step([1, 2]), lambda env: env.reset(options={"x": 1})]
+)
+def test_wrong_calls_are_refused(call: Any) -> None:
+    env = task()
+    env.reset(seed=1)
+    with pytest.raises(ParameterError):
+        call(env)

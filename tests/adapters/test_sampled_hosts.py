@@ -14,7 +14,7 @@ import pytest
 
 from gms_fsm import Chart, Contact, FrictionState, Prescribed, State, simulate
 from gms_fsm.adapters.control import friction_system
-from gms_fsm.adapters.pathsim import friction_block
+from gms_fsm.adapters.pathsim import friction_block, system_block
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import ParameterError
 from tests.adapters.loops import (
@@ -24,6 +24,7 @@ from tests.adapters.loops import (
     sequence,
     servo_in_control,
     servo_in_pathsim,
+    sled,
 )
 from tests.helpers import pulled_mass
 
@@ -239,3 +240,28 @@ def test_a_block_that_is_first_asked_later_begins_then() -> None:
     (samples,) = block.events
     samples.func_act(2.0)
     assert block.friction.t == 2.0
+
+
+# --------------------------------------------------------------------------- a whole system
+def test_a_system_in_a_block_moves_as_simulate_says() -> None:
+    block, source = system_block(sled(), 0.01, ["x", "pad.F"]), Source(lambda t: 3.0 * t)
+    pathsim.Simulation(
+        [source, block], [pathsim.Connection(source, block)], dt=0.01, log=False
+    ).run(1.0)
+    trace = simulate(sled(), block.system.t, inputs={"u": "3 * t"})
+    assert block.system.value("x") == pytest.approx(trace.body("sled").x[-1], rel=1e-6)
+    assert block.outputs["pad.F"] == pytest.approx(trace.contact("pad").F[-1], rel=1e-2)
+    assert [each.edge for each in block.switches] == list(trace.transitions.edge)
+    first = block.system.value("x")
+    block.reset()
+    assert (block.system.t, block.system.value("x"), block.switches) == (0.0, 0.0, [])
+    assert first > 0.0
+
+
+def test_what_a_block_of_a_system_cannot_do_is_refused() -> None:
+    with pytest.raises(ParameterError, match="name"):
+        system_block(sled(), 0.01, ["y"])
+    with pytest.raises(ParameterError, match="no part of|not part of"):
+        system_block(sled(), 0.01, ["x"]).to_checkpoint("block")
+    with pytest.raises(AttributeError, match="SystemState"):
+        _ = system_block(sled(), 0.01, ["x"]).friction
