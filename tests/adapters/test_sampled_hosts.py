@@ -261,7 +261,7 @@ def test_a_system_in_a_block_moves_as_simulate_says() -> None:
 def test_what_a_block_of_a_system_cannot_do_is_refused() -> None:
     with pytest.raises(ParameterError, match="name"):
         system_block(sled(), 0.01, ["y"])
-    with pytest.raises(ParameterError, match="no part of|not part of"):
+    with pytest.raises(ParameterError, match="not part of"):
         system_block(sled(), 0.01, ["x"]).to_checkpoint("block")
     with pytest.raises(AttributeError, match="SystemState"):
         _ = system_block(sled(), 0.01, ["x"]).friction
