@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any, NamedTuple, Self, TypeAlias
 
-from gms_fsm.coupling.joints import content_of
 from gms_fsm.coupling.stepping import FrictionState, Snapshot
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.arguments import checked_kind, unknown
 from gms_fsm.foundation.extras import require
+from gms_fsm.run.stepped.going_back import content_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.coupling.joint import Asked, ElementSwitch, Line
-from gms_fsm.coupling.joints import Joints, Snapshot, input_lines, made_again
+from gms_fsm.coupling.joints import Joints, input_lines, made_again
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import listed, refusing
+from gms_fsm.run.stepped.going_back import Snapshot
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 

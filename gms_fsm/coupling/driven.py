@@ -10,12 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gms_fsm.coupling.steppable import alone, begin, other_inputs
+from gms_fsm.coupling.steppable import alone, other_inputs
 from gms_fsm.errors import ParameterError, shown
 from gms_fsm.language import names_in
 from gms_fsm.lowering.program import Program
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
+from gms_fsm.run.stepped.beginning import begin
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Body, Contact, System
 

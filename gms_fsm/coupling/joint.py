@@ -12,27 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.coupling.memory import JointMemory
 from gms_fsm.coupling.steppable import start_of
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.language import EVENT
 from gms_fsm.lowering.scales import scales_of
 from gms_fsm.run.plausible import bounds_of
 from gms_fsm.run.problem import LATEST, Problem
-from gms_fsm.run.settings import MOST_STEPS
+from gms_fsm.run.stepped.failing import failure
+from gms_fsm.run.stepped.memory import JointMemory
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 from gms_fsm.traces.failures import (
-    LivelockError,
-    LockError,
-    NotFiniteError,
-    NotUniqueError,
     SimulationError,
-    StepLimitError,
-    StepSizeError,
 )
-from gms_fsm.traces.rows import Rows
-from integrators import advance, hybrid, loop
+from integrators import loop
 from integrators.runners import states
 from integrators.runners.stepping import FULL_LOG
 
@@ -41,35 +34,6 @@ ARGUMENTS = ("self", "v0", "v1", "dt")  # of `FrictionState.advance`
 # What the loop keeps only between two events at one time.
 TEMPORARY = ("cursor", "edges", "due")
 MOST = sys.float_info.max  # stands for infinity in arrays
-FAILURES: Mapping[int, tuple[type[SimulationError], str]] = {
-    loop.MACHINE_LIVELOCK: (LivelockError, "it keeps switching without progress"),
-    loop.RELATION_LIVELOCK: (LivelockError, "a comparison keeps changing without progress"),
-    advance.TOO_SMALL: (StepSizeError, "the step size fell below the resolution of the clock"),
-    loop.TOO_MANY_STEPS: (StepLimitError, f"one sample needs more than {MOST_STEPS:,} steps"),
-    advance.NOT_FINITE: (NotFiniteError, "the flow is NaN or infinite"),
-    loop.ENTANGLED: (NotUniqueError, "it is between states on surfaces that cross: not unique"),
-}
-REFUSED = LockError, "its velocity has jumped, and no edge may be taken there"  # of systems
-
-
-def failure(
-    start: Problem, memory: JointMemory, code: int, element: str, what: str, now: float
-) -> SimulationError:
-    """Return the error for a sample that cannot be completed."""
-    b = memory.buffers
-    t, modes = b.now.t, hybrid.modes_of(b)
-    where = np.array([t]), np.zeros(1, dtype=np.int64), np.array([b.now.y]), np.array([modes])
-    row = Rows(*where)
-    kind, reason = FAILURES.get(code, REFUSED)
-    error = kind(
-        reason,
-        start.trace(row, row, start.firings([])),
-        t=t,
-        place=element if code in (loop.MACHINE_LIVELOCK, loop.REFUSED) else "",
-        advice=f"the {what} is as it was before the call, at t = {now!r} s",
-    )
-    error.kept = ""  # a sample has no rows
-    return error
 
 
 class ElementSwitch(NamedTuple):

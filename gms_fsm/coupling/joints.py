@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import functools
-import threading
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,11 +11,12 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.coupling.joint import Asked, ElementSwitch, Joint, Line
-from gms_fsm.coupling.memory import BlockMemory, ListMemory, fast, machine_code
 from gms_fsm.coupling.steppable import start_of
 from gms_fsm.errors import GMSError, ParameterError
-from gms_fsm.foundation.arguments import checked_kind, unknown
+from gms_fsm.foundation.arguments import unknown
 from gms_fsm.run.problem import LATEST
+from gms_fsm.run.stepped.going_back import Alone, Snapshot, content_of, in_use
+from gms_fsm.run.stepped.memory import BlockMemory, ListMemory, fast, machine_code
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
@@ -25,48 +24,6 @@ CHANGE = 1e-4  # of the last velocity, for a derivative by differences
 Lost = dict[Joint, list[ElementSwitch]]  # switches that did not fit into the log of a sample
 # When it began, v0, v1, further inputs, lost switches, and a copy of the state before it.
 LastSample = tuple[float, Any, Any, Mapping[str, Line], Lost, Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Snapshot:
-    """A state to return to, of a `FrictionState` or a `FrictionBank`.
-
-    Parameters
-    ----------
-    t : float
-        s.
-    """
-
-    t: float
-    of: tuple[str, str] = field(repr=False)  # which friction, and its engine
-    content: Any = field(repr=False)
-
-
-class Alone:
-    """Lets one thread at a time into a friction, and refuses the others at once.
-
-    The same thread may come in again: after Ctrl-C it may never have left.
-    """
-
-    def __init__(self) -> None:
-        lock = threading.RLock()
-        self.acquire, self.leave = lock.acquire, lock.release
-
-    def __enter__(self) -> None:
-        if not self.acquire(False):
-            raise in_use()
-
-    def __exit__(self, *_: object) -> None:
-        self.leave()
-
-
-def in_use() -> ParameterError:
-    """Return the error for a call while another thread's call is under way."""
-    return ParameterError(
-        "another thread is in a call of this friction",
-        advice="give each thread a friction of its own, or hold a lock during each call; nothing "
-        "has changed",
-    )
 
 
 class JointGroup:
@@ -418,16 +375,3 @@ def _pair(name: str, given: Any, checked: Any) -> Line:
         place=name,
         value=given,
     )
-
-
-def content_of(snapshot: object, kind: type[Any], identity: tuple[str, str]) -> Any:
-    """Return the content of a snapshot if it is of the same friction."""
-    checked: Any = checked_kind("snapshot", snapshot, kind, "what snapshot() returned")
-    if checked.of != identity:
-        reason = "it is of a friction with another engine"
-        if checked.of[0] != identity[0]:
-            reason = "it is of another model, or of one with other numbers"
-        raise ParameterError(
-            reason, place="snapshot", advice="take it from a friction made in the same way"
-        )
-    return checked.content

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.language import CONSTANTS
-from gms_fsm.run.problem import LATEST, Problem
+from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
+from gms_fsm.run.stepped.beginning import begin, usable
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners, Function
 from gms_fsm.systems.system import Body, Contact, System
@@ -70,30 +70,6 @@ def start_of_system(
     moved = dataclasses.replace(system, signals=signals)
     chosen = usable(settings, "located", "held")  # held events are periods of contacts
     return Problem.of(moved, None, end, chosen, t_start=t, initial=initial)
-
-
-def usable(settings: Settings, *events: str) -> Settings:
-    """Return settings for stepping, or refuse."""
-    if not isinstance(settings.method, str) or settings.events not in events:
-        raise ParameterError(
-            "only the methods of gms-fsm that locate switches can be handed over",
-            place="settings",
-            advice='leave method and events out, or choose method="dp45"',
-        )
-    return dataclasses.replace(settings, engine="ifelse", output="end", t_eval=None)
-
-
-def begin(t: object) -> tuple[float, float]:
-    """Return the time at which a friction begins, and some later time."""
-    start = checked_scalar("t", t, "finite")
-    if not -LATEST <= start < LATEST:
-        raise ParameterError(
-            "the clock would be too coarse",
-            place="t",
-            value=start,
-            advice=f"at least {-LATEST:g} s, and less than {LATEST:g} s",
-        )
-    return start, min(start + 1.0, LATEST)
 
 
 def alone(given: Model | Contact) -> Contact:

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.coupling.joint import Asked, ElementSwitch, Line
-from gms_fsm.coupling.joints import Joints, Snapshot, input_lines, made_again
+from gms_fsm.coupling.joints import Joints, input_lines, made_again
 from gms_fsm.foundation.arguments import refusing
+from gms_fsm.run.stepped.going_back import Snapshot
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 

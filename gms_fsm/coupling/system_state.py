@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from typing import Any, Unpack
 
 from gms_fsm.charts.parameters import checked_scalar
-from gms_fsm.coupling.joints import Snapshot, checked_engine, in_use, too_late
-from gms_fsm.coupling.plant import Plant, SystemSwitch
+from gms_fsm.coupling.joints import checked_engine, too_late
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.run.problem import LATEST
 from gms_fsm.run.settings import RunOptions, Settings
+from gms_fsm.run.stepped.going_back import Snapshot, in_use
+from gms_fsm.run.stepped.plant import Plant, SystemSwitch
 from gms_fsm.systems.system import System
 
 __all__ = ["SystemState", "SystemSwitch"]

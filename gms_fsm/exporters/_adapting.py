@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
-from gms_fsm.coupling.memory import arguments_of
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import identifier
 from gms_fsm.exporters._quantities import Quantity
@@ -14,6 +13,7 @@ from gms_fsm.language import names_in, spell
 from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.following import adapting_of
+from gms_fsm.run.stepped.memory import arguments_of
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout
 from integrators.runners.compiled import is_known

@@ -15,8 +15,6 @@ from typing import Any
 
 from gms_fsm._version import __version__
 from gms_fsm.charts.nesting import spelled
-from gms_fsm.coupling.joint import FAILURES
-from gms_fsm.coupling.memory import MOST_SWITCHES
 from gms_fsm.exporters._adapting import (
     PLACES,
     STEPS,
@@ -31,6 +29,8 @@ from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.plain.c import C_WORDS
 from gms_fsm.foundation.text import visible
 from gms_fsm.run.problem import LATEST, Problem
+from gms_fsm.run.stepped.failing import FAILURES
+from gms_fsm.run.stepped.memory import MOST_SWITCHES
 from integrators.loop import TOO_MANY_STEPS
 from integrators.machine_code.c99 import number_text
 from integrators.machine_code.c_records import CBlock, records_text

@@ -9,12 +9,13 @@ from typing import Any
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.coupling.compensator import Compensator
-from gms_fsm.coupling.steppable import alone, begin, start_of, start_of_system
+from gms_fsm.coupling.steppable import alone, start_of, start_of_system
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._names import slug
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import Settings
+from gms_fsm.run.stepped.beginning import begin
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.signals import Corners
 from gms_fsm.systems.system import Contact, System

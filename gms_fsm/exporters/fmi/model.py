@@ -12,14 +12,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from gms_fsm._version import __version__
-from gms_fsm.coupling.joint import FAILURES
-from gms_fsm.coupling.memory import arguments_of
 from gms_fsm.exporters._adapting import PLACES, STEPS, translate
 from gms_fsm.exporters._c import TEMPLATES, filled, safe
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.fmi.variables import FmuVariable, indicators_of, nominals_of, types_of
 from gms_fsm.lowering.adapting import Adapting
 from gms_fsm.run.recording.following import adapting_of
+from gms_fsm.run.stepped.failing import FAILURES
+from gms_fsm.run.stepped.memory import arguments_of
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout, MemoryBlock

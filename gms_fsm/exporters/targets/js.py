@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gms_fsm._version import __version__
-from gms_fsm.coupling.joint import FAILURES
 from gms_fsm.errors import ParameterError
 from gms_fsm.exporters._adapting import (
     STEPS,
@@ -34,6 +33,7 @@ from gms_fsm.lowering.program import equations
 from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.recording.compiled_run import example_of
 from gms_fsm.run.recording.following import adapting_of
+from gms_fsm.run.stepped.failing import FAILURES
 from gms_fsm.systems.signals import Function
 from integrators import hybrid, loop
 from integrators.machine_code.front_end.translate import Translator

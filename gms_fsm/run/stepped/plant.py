@@ -17,10 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gms_fsm.charts.parameters import as_floats
-from gms_fsm.coupling.joint import failure
-from gms_fsm.coupling.joints import Alone, Snapshot, content_of
-from gms_fsm.coupling.memory import BlockMemory, ListMemory
-from gms_fsm.coupling.steppable import begin, usable
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.language import EVENT
@@ -28,6 +24,10 @@ from gms_fsm.lowering.generated import reads_time
 from gms_fsm.lowering.pulses import step_times
 from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.settings import Settings
+from gms_fsm.run.stepped.beginning import begin, usable
+from gms_fsm.run.stepped.failing import failure
+from gms_fsm.run.stepped.going_back import Alone, Snapshot, content_of
+from gms_fsm.run.stepped.memory import BlockMemory, ListMemory
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.signals import Corners, Function
 from gms_fsm.systems.system import System

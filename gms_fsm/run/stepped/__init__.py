@@ -1,0 +1,1 @@
+"""Systems that are advanced sample by sample: their memory, and what advances it."""
