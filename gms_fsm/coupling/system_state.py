@@ -33,6 +33,9 @@ class SystemState:
         With ``inputs=(...)``; its own signals are expressions in t, or constants.
     t : float
         s: the beginning.
+    t_end : float, optional
+        s: the end of the run whose bits are wanted. Before it begins, `simulate` looks for where a
+        formula in t rests and then moves, up to its end; the steps then meet these times, too.
     initial : mapping, optional
         As for `gms_fsm.simulate`.
     settings : Settings, optional
@@ -51,8 +54,7 @@ class SystemState:
     -----
     A run ends its last step before an input jumps one clock tick earlier. If texts read the time, a
     sample that turns out to end so is therefore advanced again when the next one begins; its last
-    bits may change then. A formula in t that rests and then moves is looked at by a run before it
-    begins; here steps just end with the samples.
+    bits may change then.
 
     Examples
     --------
@@ -75,6 +77,7 @@ class SystemState:
         system: System,
         *,
         t: float = 0.0,
+        t_end: float | None = None,
         initial: Mapping[str, Any] | None = None,
         settings: Settings | None = None,
         engine: str | None = None,
@@ -82,7 +85,8 @@ class SystemState:
     ) -> None:
         checked_kind("system", system, System, "a System")
         chosen = Settings.of(settings, "SystemState", **options)
-        self._plant = Plant(system, t, initial, chosen, checked_engine(engine))
+        end = None if t_end is None else checked_scalar("t_end", t_end, "finite")
+        self._plant = Plant(system, t, initial, chosen, checked_engine(engine), end)
         self._names = system.inputs
 
     def __repr__(self) -> str:
@@ -291,8 +295,8 @@ class SystemState:
         """Return how to make a copy: memory of machine code is not copied."""
         plant = self._plant
         with plant.alone:
-            given = (plant.system, plant.t_start, plant.initial, plant.settings, plant.engine)
-            return _made_again, (*given, plant.packed())
+            given = (plant.system, plant.t_start, plant.t_end, plant.initial, plant.settings)
+            return _made_again, (*given, plant.engine, plant.packed())
 
     def snapshot(self) -> Snapshot:
         """Return the present state, to return to it with `restore`.
@@ -323,10 +327,16 @@ class SystemState:
 
 
 def _made_again(
-    system: System, t: float, initial: Any, settings: Settings, engine: str, packed: Any
+    system: System,
+    t: float,
+    t_end: float | None,
+    initial: Any,
+    settings: Settings,
+    engine: str,
+    packed: Any,
 ) -> SystemState:
     """Return a copy of a `SystemState`, also in another process."""
-    new = SystemState(system, t=t, initial=initial, settings=settings, engine=engine)
+    new = SystemState(system, t=t, t_end=t_end, initial=initial, settings=settings, engine=engine)
     new._plant.unpack(packed)
     return new
 

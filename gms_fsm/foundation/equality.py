@@ -32,7 +32,10 @@ def by_value(*ordered: str) -> Callable[[Kind], Kind]:
 
     def key(self: Any) -> tuple[Hashable, ...]:
         found = ((each.name, getattr(self, each.name)) for each in fields(self) if each.compare)
-        return tuple(_key([*value.items()] if name in ordered else value) for name, value in found)
+        return tuple(
+            _key([*value.items()] if name in ordered and isinstance(value, Mapping) else value)
+            for name, value in found
+        )
 
     def equal(self: Any, other: object) -> Any:
         if type(other) is not type(self):

@@ -168,6 +168,12 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
     True
     """
     system = mounted(system, rig).system
+    for sampler in system.controllers:
+        raise ParameterError(
+            "it is a Python function, which cannot be written as text",
+            place=f"sampled {sampler.name!r}",
+            advice="write its updates as texts; simulate and Session call it as it is",
+        )
     if system.open:
         raise ParameterError(
             f"its inputs {', '.join(system.open)} are not given",

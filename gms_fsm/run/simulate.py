@@ -28,6 +28,7 @@ from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.run.recording.recording import Recorder, check_end, explained, interference_error
 from gms_fsm.run.recording.until import SeenUntil, Until
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
+from gms_fsm.run.stepped.controlled import controlled
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import arguments_of
 from gms_fsm.systems.rigs import Rig
@@ -163,6 +164,8 @@ def simulate(
         raise ParameterError(
             "it must be a function of the moment reached", place="progress", value=progress
         )
+    if isinstance(model, System):
+        model = controlled(model, end, chosen, t_start=t_start, initial=initial)
     path = None if checkpoint is None else checked_path("checkpoint", checkpoint)
     if machines is not None and chosen.engine == "ifelse":
         raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")

@@ -16,6 +16,7 @@ from gms_fsm.foundation.display import displayed
 from gms_fsm.language import Condition
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import SettingOptions, Settings
+from gms_fsm.run.stepped.controlled import controlled
 from gms_fsm.session import _breakpoints, _conditions, _session_file
 from gms_fsm.session._breakpoints import KINDS, Breakpoint
 from gms_fsm.session._conditions import holds_at
@@ -89,6 +90,8 @@ class Session:
     ) -> None:
         self.settings = checked_settings(settings, options)
         on, end = arguments_of("Session", model, rig, t_end)
+        if isinstance(model, System):
+            model = controlled(model, end, self.settings, t_start=t_start, initial=initial)
         self.made_of = model, on, end
         what = mounted(model, on, self.settings.held_period)
         self.tree = Tree(what, end, t_start, initial, self.settings)

@@ -366,26 +366,35 @@ class Sampled:
         Unique in its system.
     period : float
         s.
-    updates : mapping of str to str
+    updates : mapping of str to str, or callable
         For each value its text over the names of the system and ``period``; they run in this order
         and see the results before them. ``delay(u, 3)`` is what u was three ticks before, kept in
         further values, of a sampler called pid ``pid__u__1``, ``pid__u__2`` and ``pid__u__3``.
+        A Python function is called with the values that its parameters name (``t`` and ``period``
+        among them), and returns those of `outputs`: a number, or one for each. `simulate` and
+        `Session` call it, and what it returned is then in their runs as records.
+    outputs : sequence of str, optional
+        What a function returns.
     initial : mapping of str to float, optional
         Values before the first tick; 0 where not given, what is delayed as what it comes from.
     offset : float
         s: the first tick is at t_start + offset. Period, offset and start count as the decimal
         numbers that are written, so that ticks of several rates coincide exactly: ten periods of
-        0.1 ms are one of 1 ms. What ticks at one instant does so in the order listed.
+        0.1 ms are one of 1 ms. What ticks at one instant does so in the order listed, functions
+        first.
 
     Examples
     --------
     >>> Sampled("pid", period=1e-3, updates={"u": "k_p * (r - x)"}).period
     0.001
+    >>> Sampled("pd", period=1e-3, updates=lambda x, v: -9.0 * x - v, outputs=("u",)).outputs
+    ('u',)
     """
 
     name: str
     period: float = field(kw_only=True)
-    updates: Mapping[str, str] = field(kw_only=True)
+    updates: Any = field(kw_only=True)  # texts by name, or a function
+    outputs: tuple[str, ...] = field(default=(), kw_only=True)
     initial: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     offset: float = field(default=0.0, kw_only=True)
 
@@ -394,28 +403,43 @@ class Sampled:
         put = object.__setattr__
         put(self, "period", checked_scalar(f"{here}: period", self.period, "> 0"))
         put(self, "offset", checked_scalar(f"{here}: offset", self.offset, ">= 0"))
-        given = texts_of(self.updates, f"{here}: updates")
-        put(self, "updates", _with_delays(given, self.name, here))
         put(self, "initial", mapping_of(self.initial, f"{here}: initial"))
+        put(self, "outputs", several(self.outputs, str, f"{here}: outputs"))
+        if callable(self.updates) != bool(self.outputs):
+            raise ParameterError(
+                "its outputs have no names"
+                if not self.outputs
+                else "texts have outputs by their own names",
+                place=f"{here}: outputs",
+                advice='outputs=("u",) names what a Python function returns',
+            )
+        if not callable(self.updates):
+            given = texts_of(self.updates, f"{here}: updates")
+            put(self, "updates", _with_delays(given, self.name, here))
         if not self.updates:
             raise ParameterError(
                 "it updates nothing", place=here, advice='give updates, such as {"u": "k_p * x"}'
             )
         for name in self.initial:
-            if name not in self.updates:
+            if name not in self.values:
                 raise ParameterError(
                     f"initial has {shown(name)}, which is not updated",
                     place=here,
-                    advice=f"its values are {', '.join(self.updates)}",
+                    advice=f"its values are {', '.join(self.values)}",
                 )
         put(
             self,
             "initial",
             {
                 name: checked_scalar(f"{here}: initial[{name!r}]", self._before(name), "finite")
-                for name in self.updates
+                for name in self.values
             },
         )
+
+    @property
+    def values(self) -> tuple[str, ...]:
+        """The names of what it updates."""
+        return self.outputs or tuple(self.updates)
 
     def _before(self, name: str) -> float:
         """Return a value before the first tick."""
@@ -427,7 +451,7 @@ class Sampled:
         lead = f"{self.name}__"
         return {
             name: name.removeprefix(lead).rpartition("__")[0]
-            for name in self.updates
+            for name in self.values
             if name.startswith(lead)
         }
 

@@ -105,7 +105,7 @@ class System:
     flow : mapping of str to str, optional
         Further smooth states, each with its time derivative: a current, an integrator.
     sampled : sequence of Sampled, optional
-        Controllers with ticks.
+        Controllers with ticks; those that are Python functions are kept in `controllers`.
     let : mapping of str to str, optional
         Named expressions of the above, for all texts but those of signals and given velocities;
         later ones can use earlier ones.
@@ -124,8 +124,8 @@ class System:
     Locked contacts may hold the same motion. The earlier ones, as listed, then carry the force, and
     those that would repeat them carry none; `Trace.shared` marks these.
 
-    Systems are equal if all their parts are: bodies, contacts with their charts and numbers,
-    springs, signals. So are models, rigs and signals; functions only if they are the same.
+    Systems are equal if all their parts are. So are models, rigs and signals; functions only if
+    they are the same.
 
     Examples
     --------
@@ -151,6 +151,7 @@ class System:
     let: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     units: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     inputs: tuple[str, ...] = field(default=(), kw_only=True)
+    controllers: tuple[Sampled, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
@@ -162,17 +163,20 @@ class System:
             "contacts": Contact,
             "supervisors": Supervisor,
             "sampled": Sampled,
+            "controllers": Sampled,
         }
         for each, kind in kinds.items():
             put(self, each, several(getattr(self, each), kind, f"{here}: {each}"))
+        called = (*self.controllers, *(each for each in self.sampled if each.outputs))
+        put(self, "controllers", called)
+        put(self, "sampled", tuple(each for each in self.sampled if not each.outputs))
         if self.contacts and not self.bodies:
             raise ParameterError(
                 "it has contacts, but no bodies", place=here, advice="give the bodies that move"
             )
         if not self.machines:
-            raise ParameterError(
-                "it has no contacts and no supervisors", place=here, advice="give at least one"
-            )
+            reason = "it has no contacts and no supervisors"
+            raise ParameterError(reason, place=here, advice="give at least one")
         numbers = {
             name: checked_scalar(f"{here}: {name}", value, "finite")
             for name, value in mapping_of(self.numbers, f"{here}: numbers").items()
@@ -243,7 +247,7 @@ class System:
                     )
                 owner[name] = kind
         seen: set[str] = set()
-        for attribute in ("bodies", "springs", "contacts", "supervisors", "sampled"):
+        for attribute in ("bodies", "springs", "contacts", "supervisors", "sampled", "controllers"):
             for i, part in enumerate(getattr(self, attribute)):
                 key = (attribute, i, "name")
                 check_name(part.name, f"{here}, {type(part).__name__.lower()}", key)
@@ -345,8 +349,9 @@ class System:
     # ------------------------------------------------------------------ queries
     @property
     def open(self) -> tuple[str, ...]:
-        """The inputs that no signal is given for."""
-        return tuple(name for name in self.inputs if name not in self.signals)
+        """The inputs that no signal is given for, and what Python functions return."""
+        returned = (name for each in self.controllers for name in each.outputs)
+        return tuple(name for name in (*self.inputs, *returned) if name not in self.signals)
 
     @property
     def given(self) -> tuple[str, ...]:

@@ -131,3 +131,11 @@ def test_a_tolerance_without_a_scale_knows_nothing_of_inputs_to_come() -> None:
     state = stepped(system, *record, engine="ifelse")
     trace = simulate(system, 2.0, inputs={"u": record}, engine="ifelse")
     assert state.value("x") == trace.body("sled").x[-1]
+
+
+def test_where_a_formula_rests_is_known_with_the_end() -> None:
+    pulse = "exp(-((t - 1.013) / 0.004)**2)"
+    system, times = sled("u + 9 * f", signals={"f": pulse}), np.array([0.0, 2.0])
+    state = stepped(system, times, times, engine="ifelse", t_end=2.0)
+    trace = simulate(system, 2.0, inputs={"u": (times, times)}, engine="ifelse")
+    assert state.value("x") == trace.body("sled").x[-1]

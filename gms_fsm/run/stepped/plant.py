@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -22,7 +23,7 @@ from gms_fsm.foundation.arguments import unknown
 from gms_fsm.language import EVENT
 from gms_fsm.lowering.generated import reads_time
 from gms_fsm.lowering.pulses import step_times
-from gms_fsm.run.problem import LATEST, Problem
+from gms_fsm.run.problem import LATEST, Problem, with_waking_times
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.stepped.beginning import begin, usable
 from gms_fsm.run.stepped.failing import failure
@@ -68,9 +69,10 @@ class Plant:
         initial: Mapping[str, Any] | None,
         settings: Settings,
         engine: str,
+        t_end: float | None = None,
     ) -> None:
         self.system, self.initial, self.settings, self.engine = system, initial, settings, engine
-        self.inputs, self.t_start = system.inputs, t
+        self.inputs, self.t_start, self.t_end = system.inputs, t, t_end
         count = len(self.inputs)
         self.start = self.started([0.0] * count)
         kind = BlockMemory if engine == "compiled" else ListMemory
@@ -89,6 +91,10 @@ class Plant:
         self._sees_ends = _sees_ends(self.start)
         self._steps = self.start.program.plan.steps
         self._knots: tuple[float, list[float]] = -np.inf, []  # up to when, and they
+        if t_end is not None:
+            program = dataclasses.replace(self.start.program, knots=[])
+            self._knots = t_end, with_waking_times(program, self.start.system, t, t_end).knots
+        self._in_parts = bool(self._steps or self._knots[1])
         self._sample.waits = True  # except in a sample without length
 
     def started(self, values: Sequence[float]) -> Problem:
@@ -101,13 +107,10 @@ class Plant:
         for name, signal in self.system.signals.items():
             if name in signals:
                 continue
-            if isinstance(signal, Function) or (
-                isinstance(signal, Corners) and np.ptp(signal.values)
-            ):
+            function = isinstance(signal, Function) and self.engine == "compiled"
+            if function or (isinstance(signal, Corners) and np.ptp(signal.values)):
                 raise ParameterError(
-                    "it is a Python function"
-                    if isinstance(signal, Function)
-                    else "it is a record or has ramps",
+                    "it is a Python function" if function else "it is a record or has ramps",
                     place=f"signal {name!r}",
                     advice="name it among the inputs of the system, and give it in each call; or "
                     "write it as an expression in t",
@@ -164,7 +167,7 @@ class Plant:
         sample.end = end
         for k, row in enumerate(self._rows):
             row[0], row[1] = first[k], last[k]
-        if self.last is None or self._steps or not end > t:
+        if self.last is None or self._in_parts or not end > t:
             return self._unusual(t, end, first, last, jumps)
         if jumps:
             sample.jumps = True
@@ -181,7 +184,7 @@ class Plant:
         sample, b, lost = self._sample, self.memory.buffers, tuple[SystemSwitch, ...]()
         if b.memory.phase == loop.START:
             self._enter(first if end > t else last)
-        knots = self.knots(t, end) if self._steps else []
+        knots = self.knots(t, end) if self._in_parts else []
         sample.until = end
         for part in (*knots, end):
             sample.end = part
@@ -230,7 +233,7 @@ class Plant:
             until = end + AHEAD
             known = sorted(step_times(self._steps, shared, rows, self.t_start, until))
             self._knots = until, known
-        return [knot for knot in known if t < knot < end]
+        return known[bisect_right(known, t) : bisect_left(known, end)]
 
     def peek(
         self, end: float, first: list[float], last: list[float], names: Sequence[str]

@@ -236,6 +236,12 @@ def save_as(kind: type[SystemFile], system: System, path: Path, **further: Any) 
     """Write a file that holds a system and more."""
     contacts = [ContactInFile(**described(each), **_numbers(each)) for each in system.contacts]
     machines = [SupervisorInFile.of(each, **_numbers(each)) for each in system.supervisors]
+    for sampler in system.controllers:
+        raise OutputError(
+            f"sampled {sampler.name!r} is a Python function, which a file cannot store",
+            place=str(path),
+            advice="write its updates as texts",
+        )
     table = kind(**{**plain(system), "contacts": contacts, "supervisors": machines, **further})
     for name, signal in table.signals.items():
         if isinstance(signal, FunctionTable):
