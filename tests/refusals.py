@@ -2382,6 +2382,29 @@ rows = {
     "input with a bad name": ("system 'open', input", ..., lambda: opened(inputs=("2u",))),
 }  # fmt: skip
 group("inputs of a system", ParameterError, lambda make: make(), rows)
+CALLED = {"period": 0.1, "outputs": ("u",)}
+
+
+def called(function: Any) -> System:
+    """Return a system with a controller that is a Python function."""
+    return opened(inputs=(), sampled=(Sampled("pd", updates=function, **CALLED),))
+
+
+rows = {
+    "stepped": ("sampled 'pd'", ..., lambda: SystemState(called(lambda x: x))),
+    "outputs without names": (
+        "sampled 'pd': outputs", ..., lambda: Sampled("pd", period=0.1, updates=abs)),
+    "names for texts": (
+        "sampled 'pd': outputs", ..., lambda: Sampled("pd", updates={"u": "1"}, **CALLED)),
+    "unknown value": ("sampled 'pd'", ..., lambda: simulate(called(lambda y: y), 1.0)),
+    "any values": ("sampled 'pd'", ..., lambda: simulate(called(lambda **all: 1.0), 1.0)),
+}  # fmt: skip
+group("controllers in Python", ParameterError, lambda make: make(), rows)
+rows = {
+    "it raises": ("sampled 'pd'", ..., lambda: simulate(called(lambda t: 1 / t), 1.0)),
+    "it returns a text": ("sampled 'pd'", ..., lambda: simulate(called(lambda t: "fast"), 1.0)),
+}
+group("a call of a controller", SignalError, lambda make: make(), rows)
 # --------------------------------------------------------------------------- sessions
 FIG4 = stick_slip("published"), Prescribed(FIG4_SINE)
 
