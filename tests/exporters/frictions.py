@@ -24,10 +24,12 @@ from gms_fsm import (
     Transition,
     simulate,
 )
-from gms_fsm.app.scenario import load_system
+from gms_fsm.app.scenario import load_scenario, load_system
 from gms_fsm.charts.registry import entry
 from gms_fsm.charts.zoo.sliding.karnopp import KARNOPP
 from gms_fsm.systems.models import demonstration
+from gms_fsm.systems.system import system_of
+from tests.helpers import ROOT
 from tests.physics.test_sliding_follows_filippov import follower
 
 CHARTS = ("lugre", "elasto-plastic", "seven-parameter", "maxwell-slip", "reset-integrator")
@@ -207,3 +209,9 @@ def reads_acceleration() -> Chart:
         ),
         outputs={"F": "k * z"},
     )
+
+
+def scenario(name: str) -> System:
+    """Return the system of an included scenario."""
+    loaded = load_scenario(ROOT / f"gms_fsm/scenarios/{name}.toml")
+    return loaded.system or system_of(loaded.model, loaded.rig)

@@ -18,8 +18,10 @@ import numpy as np
 import pytest
 
 from gms_fsm import ChartModel, Model, Prescribed, System, export, simulate
+from gms_fsm.exporters._subject import Subject
+from gms_fsm.exporters.fmi.variables import variables_of
 from gms_fsm.foundation.quantities import base_units
-from tests.exporters.frictions import reads_acceleration, servo
+from tests.exporters.frictions import reads_acceleration, scenario, servo
 from tests.helpers import stick_slip
 from tests.supervisor_cases import crossing
 
@@ -114,6 +116,24 @@ def test_a_chart_that_reads_the_acceleration_has_no_model_exchange(form: str) ->
     assert "<CoSimulation" in files["modelDescription.xml"]
     assert "<ModelExchange" not in files["modelDescription.xml"]
     assert "There is none: a chart reads how fast an input changes" in readme
+
+
+def test_what_turns_has_units_of_turning() -> None:
+    system = scenario("robot_joint")
+    units = {
+        each.name: each.unit for each in variables_of(Subject.of(system, "fmu2"), exchange=True)
+    }
+    wanted = {
+        "theta": "rad", "w_m": "rad/s", "der(w_m)": "rad/s^2", "bearings.F": "Nm",
+        "bearings.k[1]": "Nm/rad", "bearings.sigma_2": "Nms/rad", "bearings.v_s": "rad/s",
+    }  # fmt: skip
+    assert {name: units[name] for name in wanted} == wanted
+    assert all(base_units(unit) is not None for unit in units.values() if unit)
+    bit = {
+        e.name: e.unit
+        for e in variables_of(Subject.of(scenario("drill_string"), "fmu2"), exchange=True)
+    }
+    assert [bit[f"rock.{each}"] for each in ("W", "R_b", "v", "F")] == ["N", "m", "rad/s", "Nm"]
 
 
 def test_units_are_made_of_base_units() -> None:

@@ -23,7 +23,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:the FMU has no binary"),
 ]
 RUNS = ("open loop", "system servo")
-NOT_OF_SYSTEMS = {"scxml", "transitions", "st"}
+NOT_OF_SYSTEMS = {"scxml", "transitions", "matlab", "modelica", "st"}  # not of one with locks
 PAIRS = [*itertools.product(formats(), RUNS)]
 SLOWER = {("fmu3", "open loop"), ("fmu2", "system servo"), ("js", "open loop")}
 
