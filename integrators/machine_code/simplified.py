@@ -407,6 +407,11 @@ def _forwarded(function: TypedFunction) -> TypedFunction:
                 ):
                     made[-1] = Assign(target, value)
                     continue
+                case Assign(source, value), Put(address=address, value=Local() as copied) if (
+                    copied == source and once(source) and address.index is None
+                ):
+                    made[-1] = replace(each, value=value)
+                    continue
             made.append(each)
         return (*made, *waiting.values())
 

@@ -74,7 +74,8 @@ def take(work: Work, arguments: Sequence[Value]) -> None:
     def own(expr: Expr, name: str) -> Expr:
         for each in locals_in(expr):
             if each not in known:
-                known[each] = parameter(each.name.partition(".")[0] or name, each.kind, each.to)
+                first = each.name.partition(".")[0] or name
+                known[each] = parameter(first if each.kind == "p" else name, each.kind, each.to)
         return substituted(expr, known)  # type: ignore[no-any-return]
 
     def bound(value: Value, name: str, direct: bool) -> Value:
