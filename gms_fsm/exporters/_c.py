@@ -33,11 +33,11 @@ from gms_fsm.run.stepped.failing import FAILURES
 from gms_fsm.run.stepped.memory import MOST_SWITCHES
 from integrators.loop import TOO_MANY_STEPS
 from integrators.machine_code.c99 import number_text
-from integrators.machine_code.c_records import CBlock, records_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout, MemoryBlock
-from integrators.machine_code.possible import BlockStart
-from integrators.machine_code.simplified import simplified
+from integrators.machine_code.readable.c_records import CBlock, records_text
+from integrators.machine_code.readable.possible import BlockStart
+from integrators.machine_code.readable.simplified import simplified
 from integrators.runners.compiled import INLINE
 from integrators.runners.stepping import FULL_LOG
 

@@ -13,11 +13,11 @@ from gms_fsm.exporters.plain.form import plain_form
 from gms_fsm.exporters.plain.parts import Constant
 from gms_fsm.exporters.plain.walker import Forms, Walker, indented
 from gms_fsm.language import ARGUMENTS, C99, FUNCTIONS, NAMESPACE
-from integrators.machine_code.c_records import records_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
-from integrators.machine_code.possible import BlockStart
-from integrators.machine_code.simplified import simplified
+from integrators.machine_code.readable.c_records import records_text
+from integrators.machine_code.readable.possible import BlockStart
+from integrators.machine_code.readable.simplified import simplified
 from integrators.machine_code.tree import Local
 
 __all__ = ["C_WORDS", "plain_c", "plain_c_notes"]

@@ -24,21 +24,11 @@ __all__ = ["ContactPart", "WholeSystem", "safe_name"]
 
 @dataclass(frozen=True, eq=False)
 class ContactPart:
-    """A contact of a system.
-
-    Parameters
-    ----------
-    name : str
-        The contact's.
-    friction : Subject
-        What is exported of it.
-    inputs : tuple of (str, Value)
-        Of its friction, the velocity first; over the names of the system.
-    """
+    """A contact of a system."""
 
     name: str
     friction: Subject
-    inputs: tuple[tuple[str, Value], ...]
+    inputs: tuple[tuple[str, Value], ...]  # the velocity first; over the names of the system
 
     @property
     def force(self) -> str:
@@ -48,50 +38,21 @@ class ContactPart:
 
 @dataclass(frozen=True, eq=False)
 class WholeSystem:
-    """A system of bodies, springs, samplers and contacts.
-
-    Parameters
-    ----------
-    subject : Subject
-        What is exported.
-    numbers : mapping of str to float
-        By name.
-    inputs : tuple of str
-        Signals that are records.
-    definitions : tuple of (str, Value)
-        Each after those it needs.
-    rates : mapping of str to (Value, Value)
-        Of each state what its derivative is multiplied with, and what that is; the forces of
-        contacts are in it.
-    start : mapping of str to float
-        Initial values of states and of what samplers give out.
-    contacts : tuple of ContactPart
-        In the system's order.
-    samplers : tuple of Sampled
-        In the system's order; `updates` has their trees.
-    updates : mapping of str to mapping of str to Value
-        By sampler.
-    """
+    """A system of bodies, springs, samplers and contacts."""
 
     subject: Subject
     numbers: Mapping[str, float]
-    inputs: tuple[str, ...]
-    definitions: tuple[tuple[str, Value], ...]
-    rates: Mapping[str, tuple[Value, Value]]
-    start: Mapping[str, float]
+    inputs: tuple[str, ...]  # signals that are records
+    definitions: tuple[tuple[str, Value], ...]  # each after those it needs
+    rates: Mapping[str, tuple[Value, Value]]  # of each state: factor times derivative is the other
+    start: Mapping[str, float]  # of states, and of what samplers give out
     contacts: tuple[ContactPart, ...]
     samplers: tuple[Sampled, ...]
-    updates: Mapping[str, Mapping[str, Value]]
+    updates: Mapping[str, Mapping[str, Value]]  # by sampler
 
     @classmethod
     def of(cls, subject: Subject, words: Iterable[str]) -> WholeSystem:
-        """Read a system, or refuse what a text format cannot express.
-
-        Raises
-        ------
-        ParameterError
-            For locks, supervisors, discrete machines, events and conditions that last.
-        """
+        """Read a system, or refuse what a text format cannot express."""
         system, start = subject.system, subject.start
         read: Assembly = system.assembly
         for bank in read.banks:

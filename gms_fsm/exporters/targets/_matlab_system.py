@@ -99,17 +99,7 @@ end
 
 
 class MatlabSystem:
-    """Prints a system.
-
-    Parameters
-    ----------
-    subject : Subject
-        A system.
-    words : iterable of str
-        Words of the language.
-    functions, defined : mapping of str to str
-        How functions are called, and the texts of those that the language does not have.
-    """
+    """Prints a system."""
 
     def __init__(
         self,

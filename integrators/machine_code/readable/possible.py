@@ -166,31 +166,16 @@ def _whole(base: Expr) -> bool:
 # --------------------------------------------------------------------------- values
 @dataclass(frozen=True)
 class BlockStart:
-    """What is in a block at the start, by offset.
+    """What is in a block at the start, by offset."""
 
-    Parameters
-    ----------
-    numbers : mapping of int to Const
-        Single ones.
-    arrays : mapping of int to sequence of Const
-        Of words of eight bytes.
-    """
-
-    numbers: Mapping[int, Const]
-    arrays: Mapping[int, Sequence[Const]]
+    numbers: Mapping[int, Const]  # single ones
+    arrays: Mapping[int, Sequence[Const]]  # of words of eight bytes
 
 
 class Possible:
     """The possible values of everything in a module.
 
-    Parameters
-    ----------
-    module : Module
-        The functions.
-    start : BlockStart
-        What is in the block at the start.
-    given : collection of int
-        Offsets of numbers and arrays that are also written from outside.
+    `given` are the offsets in the block of what is also written from outside.
 
     Examples
     --------

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from integrators.machine_code.possible import (
+from integrators.machine_code.readable.possible import (
     INFINITE,
     BlockStart,
     Possible,
@@ -65,20 +65,6 @@ def simplified(
     read: Collection[int],
 ) -> Module:
     """Return a module without what cannot happen.
-
-    Parameters
-    ----------
-    module : Module
-        The functions; its entries are kept.
-    start : BlockStart
-        What is in the block at the start.
-    given, read : collection of int
-        Offsets of those that are written, or read, from outside.
-
-    Returns
-    -------
-    Module
-        It computes the same.
 
     Examples
     --------

@@ -27,7 +27,7 @@ from integrators.machine_code.c99 import (
 )
 from integrators.machine_code.front_end.values import ArrayValue, NumberValue, RecordValue
 from integrators.machine_code.layout import BlockLayout
-from integrators.machine_code.possible import changing_of, expressions_in
+from integrators.machine_code.readable.possible import changing_of, expressions_in
 from integrators.machine_code.tree import (
     SIZES,
     Address,
@@ -61,30 +61,14 @@ class _Member:
 
 @dataclass
 class CBlock:
-    """The struct of a block.
-
-    Parameters
-    ----------
-    name : str
-        Of its type.
-    layout : BlockLayout
-        Where everything is.
-    parts : mapping of str to sequence of str
-        Names of the parts of tuples that have none, by the way to the tuple.
-    open : collection of str
-        Outer records whose members are members of the struct itself.
-
-    Attributes
-    ----------
-    used : set of tuple of str
-        The members that have been written down so far; only these are in the struct.
-    """
+    """The struct of a block."""
 
     name: str
     layout: BlockLayout
+    # Names of the parts of tuples that have none, by the way to the tuple.
     parts: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    open: Collection[str] = ()
-    used: set[tuple[str, ...]] = field(default_factory=set)
+    open: Collection[str] = ()  # outer records whose members are members of the struct itself
+    used: set[tuple[str, ...]] = field(default_factory=set)  # what is in the struct
 
     def __post_init__(self) -> None:
         assert isinstance(self.layout.value, RecordValue)
@@ -178,21 +162,6 @@ def _notes(record: Any) -> Mapping[str, str]:
 # --------------------------------------------------------------------------- the text
 def records_text(module: Module, block: CBlock | None = None, taken: Iterable[str] = ()) -> str:
     """Return a module as C99 with typed pointers; its entries are static, too.
-
-    Parameters
-    ----------
-    module : Module
-        From the translator; its functions have one block at most.
-    block : CBlock, optional
-        The struct of the block. Its definition is not part of the text.
-    taken : iterable of str
-        Names that the text must not define.
-
-    Returns
-    -------
-    str
-        The text. It gives no warning with ``-Wall -Wextra -Wpedantic -Wcast-qual -Wconversion``,
-        and is C++, too.
 
     Examples
     --------
