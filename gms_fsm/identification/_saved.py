@@ -99,7 +99,7 @@ def save_whole(fit: Fit, path: Path) -> Path:
         kind: table.model_dump(mode="json"),
         "options": asdict(task.options) | {"bounds": dict(task.options.bounds)},
         "begin": task.begin,
-        "starts": {str(i): _lists(start) for i, start in task.starts.items()},
+        "starts": [[*place, _lists(start)] for place, start in task.starts.items()],
         "records": [
             {
                 "name": each.name,
@@ -160,8 +160,8 @@ def _built(kind: type[Fit], data: dict[str, Any]) -> Fit:
     given |= {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
     given["bounds"] = {name: tuple(pair) for name, pair in given["bounds"].items()}
     starts = {
-        int(i): {name: np.array(values) for name, values in start.items()}
-        for i, start in data["starts"].items()
+        (i, j): {name: np.array(values) for name, values in start.items()}
+        for i, j, start in data["starts"]
     }
     subject = mounted_alone(model, inputs=names)
     task = Task(subject, records, FitOptions(**given), data["begin"], starts)

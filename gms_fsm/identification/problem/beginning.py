@@ -103,14 +103,13 @@ def estimated(
 
 def with_states(task: Task, point: Point, tau: float) -> Task:
     """Return the task with the states of courses that begin in an unknown one; itself if none."""
-    unknown = [i for i, course in enumerate(task.courses) if not course.known]
+    unknown = {place: each for place, each in task.placed.items() if not each.known}
     if not unknown or task.options.begin is not None:
         return task
     starts = {}
-    for i in unknown:
-        course = task.courses[i]
+    for place, course in unknown.items():
         covered = np.maximum.accumulate(course.x) - np.minimum.accumulate(course.x)
         until = int(np.argmax(covered >= COVERED * covered[-1]))  # then the state is forgotten
         lead = float(course.t[max(until, min(MOST_ROWS, course.t.size - 1))] - course.t[0])
-        starts[i] = estimated(task.fine, point, course, lead, tau)
+        starts[place] = estimated(task.fine, point, course, lead, tau)
     return replace(task, starts=starts)

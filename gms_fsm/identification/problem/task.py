@@ -30,6 +30,7 @@ from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import varied
 
 Window = tuple[float, float]
+Place = tuple[int, int]  # the number of a record, and that of a stretch of it
 COARSE_ROWS, FEWEST_ROWS = 3000, 300  # of all records together, and of each
 COARSE_RTOL, FINE_RTOL = 1e-6, 1e-9
 FINE_STEPS = (1e-3, 1e-4)
@@ -77,8 +78,8 @@ class Task:
         The arguments.
     begin : str
         What is before the first row of a record.
-    starts : mapping of int to mapping
-        Initial states that were estimated, by the number of the course.
+    starts : mapping of tuple of int to mapping
+        Initial states that were estimated, by the numbers of record and stretch.
     ran : list of int
         One number: how many runs were made.
     """
@@ -87,7 +88,7 @@ class Task:
     records: tuple[Record, ...]
     options: FitOptions
     begin: str = MOVING
-    starts: Mapping[int, Mapping[str, FloatArray]] = field(default_factory=dict)
+    starts: Mapping[Place, Mapping[str, FloatArray]] = field(default_factory=dict)
     ran: list[int] = field(default_factory=lambda: [0])
 
     @cached_property
@@ -102,24 +103,27 @@ class Task:
         return unknowns_of(self.subject, given.free, given.tied, given.bounds)
 
     @cached_property
-    def courses(self) -> tuple[Course, ...]:
-        """The records with the rows to train on, up to the last of them."""
-        found = []
-        for record in self.records:
+    def placed(self) -> Mapping[Place, Course]:
+        """The stretches of records with rows to train on, up to the last of them."""
+        found = {}
+        for i, record in enumerate(self.records):
             along = self.along(record, training_rows(record, self.options))
-            found += [each.ended() for each in along if each.rows.any()]
-        return tuple(
-            each if (start := self.starts.get(i)) is None else each.begun(start)
-            for i, each in enumerate(found)
-        )
+            found |= {(i, j): each.ended() for j, each in enumerate(along) if each.rows.any()}
+        return found
+
+    @cached_property
+    def courses(self) -> tuple[Course, ...]:
+        """The same without their places."""
+        return tuple(self.placed.values())
 
     def along(self, record: Record, rows: NDArray[np.bool_] | None) -> list[Course]:
         """Return what a record makes the model do, with the rows that count (None: all)."""
         given, seen = self.options, None
-        if any(record is each for each in self.records):  # its run-in was that of training rows
+        own = next((i for i, each in enumerate(self.records) if record is each), None)
+        if own is not None:  # its run-in was that of training rows
             known = np.flatnonzero(training_rows(record, given) & record.chosen)
             seen = int(known[-1]) + 1 if known.size else None
-        return courses_of(
+        found = courses_of(
             record,
             self.measured.column,
             rows=rows,
@@ -129,6 +133,13 @@ class Task:
             seen=seen,
             inputs=self.bound,
         )
+        if own is None:
+            return found
+        starts = [self.starts.get((own, j)) for j in range(len(found))]
+        return [
+            each if start is None else each.begun(start)
+            for each, start in zip(found, starts, strict=True)
+        ]
 
     @property
     def bound(self) -> tuple[str, ...]:
