@@ -939,6 +939,8 @@ rows = {
             "comment": (None, "", [None]),
             "header": (-1, True, NAN),
             "encoding": ("", []),
+            "thousands": (".", "ab"),
+            "columns": ("t,x,F", [1, 2, 3]),
             "name": (0, {}),
         }.items()
         for given in wrong
@@ -1060,6 +1062,11 @@ group("Record.from_arrays", RecordError, lambda given: arrays(**given), rows, "r
 rows = {
     "wrong option": ("missing", "fill", {"missing": "fill"}),
     "name that is no text": ("name", 5, {"name": 5}),
+    "inputs that are no mapping": ("inputs", T, {"inputs": T}),
+    "input of a quantity": ("name in inputs", "force", {"inputs": {"force": T}}),
+    "input of the model": ("name in inputs", "v", {"inputs": {"v": T}}),
+    "sort": ("sort", "time", {"sort": "time"}),
+    "duplicates": ("duplicates", "first", {"duplicates": "first"}),
 }
 group("Record.from_arrays", ParameterError, lambda given: arrays(**given), rows)
 rows = {
@@ -1106,6 +1113,7 @@ rows = {
     "bounds against the rule": ("bounds of 'k1'", ..., {"bounds": {"k": (-2, -1)}}),
     "nuisance": ("nuisance", "bias", {"nuisance": ["bias"]}),
     "search": ("search", "anneal", {"search": "anneal"}),
+    "weight": ("weight", "all", {"weight": "all"}),
     "begin": ("begin", "warm", {"begin": "warm"}),
     "measured": ("measured", ..., {"measured": "x"}),
     "drive": ("drive", "v", {"drive": "v"}),
@@ -1152,6 +1160,7 @@ rows = {
     "no records": ("records", [], {"records": []}),
     "name for a record": ("records", "rig", {"records": "rig"}),
     "one record for a fold of records": ("fold", "record", {"fold": "record"}),
+    "one amplitude": ("fold", "amplitude", {"fold": "amplitude"}),
     "candidates that cannot be run": ("candidates", ..., {"cycles": 2.0, "most_steps": 1}),
 }
 group("choose", ParameterError, choosing, rows)

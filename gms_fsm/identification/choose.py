@@ -298,8 +298,10 @@ class _Tried:
             1.0 - self.mean / self.variance if self.variance else math.nan,
             bic,
             self.seconds,
-            why=why,
-            **{f"by_{name}": value for name, value in self.others.items()},
+            "",
+            why,
+            self.others.get("amplitude", math.nan),
+            self.others.get("speed", math.nan),
         )
 
 
@@ -345,7 +347,7 @@ def _try(
         seconds, nothing = time.perf_counter() - began, math.nan
         name, reason, note = candidate.name, candidate.reason, str(error)
         return ChoiceRow(name, reason, 0, nothing, nothing, nothing, seconds, note, "failed")
-    parts = stretches(task.coarse.courses, point.residual)
+    tau = correlation_time(stretches(task.coarse.courses, point.residual))
     force = np.concatenate([each.columns["force"][each.chosen] for each in folds.all])
     return _Tried(
         candidate,
@@ -355,7 +357,7 @@ def _try(
         squares,
         counts,
         float(np.var(force)),
-        max(point.residual.size / correlation_time(parts), 2.0),
+        max(point.residual.size / tau, 2.0),
         time.perf_counter() - began,
         others,
     )

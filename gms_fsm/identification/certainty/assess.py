@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -228,7 +229,8 @@ def _shift_of_smoothing(task: Task, point: Point, slopes: FloatArray) -> FloatAr
     except LOST:
         return None
     change = less.fine.weighted(parts) - point.residual - task.fine.target
-    found: FloatArray = -16.0 / 15.0 * np.linalg.lstsq(slopes, change, rcond=1e-6)[0]
+    moved: Any = np.linalg.lstsq(slopes, change, rcond=1e-6)[0]
+    found: FloatArray = -16.0 / 15.0 * moved
     return found
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -96,7 +97,7 @@ def estimated(
                 if (there := cost(other)) < least:
                     least, found = there, other
     bounds = [(-1.0, 1.0)] * found.size
-    options = {"maxfev": 40 * found.size, "xtol": 1e-3, "ftol": 1e-3}
+    options: Any = {"maxfev": 40 * found.size, "xtol": 1e-3, "ftol": 1e-3}
     polished = minimize(cost, found, method="Powell", bounds=bounds, options=options)
     return state(polished.x if polished.fun < least else found)
 
