@@ -19,9 +19,9 @@ from gms_fsm.identification.problem.experiment import Experiment, Point
 from gms_fsm.identification.problem.runs import COVERED, LOST, Course
 from gms_fsm.identification.problem.task import Task
 
-ALIKE = 21  # first guesses: all elements alike, or all pulled by the same way
-ALONE = 5  # values of one element at a time
-PASSES = 2
+ALIKE = 13  # first guesses: all elements alike, or all pulled by the same way
+ALONE = 3  # values of one element at a time
+PASSES = 1
 MOST_ROWS = 400
 ROUNDS = 2  # of states and parameters in turn
 
@@ -97,7 +97,7 @@ def estimated(
                 if (there := cost(other)) < least:
                     least, found = there, other
     bounds = [(-1.0, 1.0)] * found.size
-    options: Any = {"maxfev": 40 * found.size, "xtol": 1e-3, "ftol": 1e-3}
+    options: Any = {"maxfev": 25 * found.size, "xtol": 1e-3, "ftol": 1e-3}
     polished = minimize(cost, found, method="Powell", bounds=bounds, options=options)
     return state(polished.x if polished.fun < least else found)
 
