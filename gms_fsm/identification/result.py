@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
-from gms_fsm.errors import ParameterError, RecordError, shown
+from gms_fsm.errors import ParameterError, RecordError
 from gms_fsm.foundation.arguments import (
     checked_integer,
     checked_kind,
@@ -31,6 +31,7 @@ from gms_fsm.identification.certainty.compared import (
     Choice,
     ChoiceRow,
     FitComparison,
+    compared,
     lines_of,
     score_of,
 )
@@ -477,31 +478,7 @@ class Fit:
             checked_kind("others", each, Fit, "fits, from fit(...)")
         names = names or [f"{i}: {each.title}" for i, each in enumerate(fits, start=2)]
         every = dict(zip([f"1: {self.title}", *names], [self, *fits], strict=True))
-        for name, each in every.items():
-            if not np.array_equal(each.task.fine.target, self.task.fine.target):
-                raise ParameterError(
-                    f"fit {shown(name)} was made from other rows",
-                    place="others",
-                    advice="compare fits to the same records, with the same train",
-                )
-            if None not in (each.test, self.test) and each.test != self.test:
-                raise ParameterError(
-                    f"other rows were held out of fit {shown(name)}",
-                    place="others",
-                    advice="compare fits with the same test",
-                )
-        # One number of rows for all, that of the best: else the order would depend on units.
-        effective = min(every.values(), key=lambda each: each.point.cost).effective_rows
-        rows = [each._compared(name, effective) for name, each in every.items()]
-        return FitComparison(tuple(sorted(rows, key=lambda row: (bool(row.note), row.rmse))))
-
-    def _compared(self, name: str, effective: float) -> ChoiceRow:
-        score = self.held_out or self.training
-        note = "" if self.held_out else "training rows: no test was given"
-        bic = self.bic(effective)
-        return ChoiceRow(
-            name, "", len(self.table), score["rmse"], score["r2"], bic, self.seconds, note
-        )
+        return compared(every, self)
 
     def simplest(self) -> Fit:
         """Return the fit without terms that cannot be told or stand at a bound.

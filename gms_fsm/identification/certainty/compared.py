@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.errors import ParameterError, shown
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,32 @@ def score_of(measured: FloatArray, modelled: FloatArray) -> dict[str, float]:
         "r2": 1.0 - float(left @ left) / whole if whole else math.nan,
         "rows": float(measured.size),
     }
+
+
+def compared(every: Mapping[str, Any], first: Any) -> FitComparison:
+    """Return fits side by side; refuse those that were made from other rows than the first."""
+    for name, each in every.items():
+        if not np.array_equal(each.task.fine.target, first.task.fine.target):
+            raise ParameterError(
+                f"fit {shown(name)} was made from other rows",
+                place="others",
+                advice="compare fits to the same records, with the same train",
+            )
+        if None not in (each.test, first.test) and each.test != first.test:
+            raise ParameterError(
+                f"other rows were held out of fit {shown(name)}",
+                place="others",
+                advice="compare fits with the same test",
+            )
+    # One number of rows for all, that of the best: else the order would depend on units.
+    effective = min(every.values(), key=lambda each: each.point.cost).effective_rows
+    rows = []
+    for name, each in every.items():
+        score = each.held_out or each.training
+        note = "" if each.held_out else "training rows: no test was given"
+        own = score["rmse"], score["r2"], each.bic(effective), each.seconds, note
+        rows.append(ChoiceRow(name, "", len(each.table), *own))
+    return FitComparison(tuple(sorted(rows, key=lambda row: (bool(row.note), row.rmse))))
 
 
 def lines_of(fit: Any) -> list[str]:
