@@ -129,15 +129,13 @@ def _lists(arrays: Any) -> dict[str, Any]:
     return {name: np.asarray(values).tolist() for name, values in arrays.items()}
 
 
-def loaded(path: Path) -> Fit:
-    """Read a fit."""
-    from gms_fsm.identification.result import Fit
-
+def loaded(kind: type[Fit], path: Path) -> Fit:
+    """Read a fit; its class is given, as it imports this module."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
         if data["format"] != FORMAT:
             raise ValueError(f"its format is {data['format']!r}")
-        return _built(Fit, data)
+        return _built(kind, data)
     except OSError as error:
         raise RecordError(f"cannot be read ({error.strerror})", place=str(path)) from None
     except (ValueError, KeyError, TypeError, IndexError) as error:

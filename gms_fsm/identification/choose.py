@@ -99,7 +99,7 @@ def choose(
     Fit
         With ``choice``: a row for each candidate, with its error on what was left out, and why it
         was not chosen. Terms that the records cannot tell are left out of the chosen model if the
-        error rises by less than 1 %, see `Fit.simplest`.
+        error rises by less than 1 %, see `simplest`.
 
     Raises
     ------
@@ -463,7 +463,24 @@ def simplest(fit: Fit) -> Fit:
     -------
     Fit
         With fewer unknowns, and a note on each that is gone; the same fit if there are none.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a fit.
+
+    Examples
+    --------
+    >>> from gms_fsm import LuGre, Stribeck, fit
+    >>> t = np.linspace(0.0, 4.0, 201)
+    >>> record = Record.from_arrays(time=t, velocity=0.02 * np.sin(t), force=np.tanh(9.0 * np.sin(t)))
+    >>> curve = Stribeck(1.0, 1.05, 1e-2)
+    >>> bristle = LuGre(sigma_0=5e3, sigma_1=0.0, sigma_2=0.0, stribeck=curve)
+    >>> found = fit(record, bristle, free=["sigma_0", "sigma_2"], search="local")
+    >>> simplest(found).open
+    ()
     """
+    checked_kind("fit", fit, Fit, "a Fit, from gms_fsm.fit")
     gone = list[str]()
     while True:
         weak = [each for each in fit.table if not each.told or each.note == AT_BOUND]

@@ -480,21 +480,6 @@ class Fit:
         every = dict(zip([f"1: {self.title}", *names], [self, *fits], strict=True))
         return compared(every, self)
 
-    def simplest(self) -> Fit:
-        """Return the fit without terms that cannot be told or stand at a bound.
-
-        They are left out one by one and the rest is fitted anew, while the error rises by less than
-        1 % each time. What the force is linear in becomes 0; other numbers keep their values.
-
-        Returns
-        -------
-        Fit
-            With fewer unknowns, and a note on what is gone.
-        """
-        from gms_fsm.identification.choose import simplest
-
-        return simplest(self)
-
     # ------------------------------------------------------------------ files
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the fitted model, driven by the motion of the first record, as a scenario.
@@ -540,7 +525,7 @@ class Fit:
         """
         from gms_fsm.identification._saved import loaded
 
-        return loaded(checked_path("path", path))
+        return loaded(cls, checked_path("path", path))
 
     def report(self, folder: str | os.PathLike[str]) -> Path:
         """Write a report: figures, tables, what the record cannot tell, and the fitted scenario.

@@ -12,6 +12,7 @@ import pytest
 from gms_fsm import ChartModel, Fit, Record
 from gms_fsm.errors import RecordError
 from gms_fsm.identification.bank import stop_operators
+from gms_fsm.identification.choose import simplest
 from gms_fsm.identification.play_bank import SPRING_WITH_PLAY, play_bank
 from tests.identification.records import (
     FREE,
@@ -99,7 +100,7 @@ def test_a_fit_is_read_back(tmp_path: Path) -> None:
 def test_the_simplest_model_has_no_term_that_cannot_be_told() -> None:
     found = fitted(rubbed(4.0), START, (*FREE, "sigma_2"))
     assert found.open == ("sigma_2",)
-    simple = found.simplest()
+    simple = simplest(found)
     assert not simple.open
     assert {each.name for each in simple.table} >= {"k1", "k2", "weights1", "weights2"}
     assert simple.training["rmse"] < 1.01 * found.training["rmse"]
