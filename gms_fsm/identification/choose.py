@@ -473,7 +473,8 @@ def simplest(fit: Fit) -> Fit:
     --------
     >>> from gms_fsm import LuGre, Stribeck, fit
     >>> t = np.linspace(0.0, 4.0, 201)
-    >>> record = Record.from_arrays(time=t, velocity=0.02 * np.sin(t), force=np.tanh(9.0 * np.sin(t)))
+    >>> v = 0.02 * np.sin(t)
+    >>> record = Record.from_arrays(time=t, velocity=v, force=np.tanh(500.0 * v))
     >>> curve = Stribeck(1.0, 1.05, 1e-2)
     >>> bristle = LuGre(sigma_0=5e3, sigma_1=0.0, sigma_2=0.0, stribeck=curve)
     >>> found = fit(record, bristle, free=["sigma_0", "sigma_2"], search="local")
