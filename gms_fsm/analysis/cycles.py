@@ -14,7 +14,7 @@ from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.foundation.display import short_repr
-from gms_fsm.gradients.arcs import is_fast
+from gms_fsm.foundation.extras import has_machine_code
 from gms_fsm.gradients.directions import INITIAL
 from gms_fsm.gradients.linear import Directions, Linear
 from gms_fsm.lowering.observing import armed
@@ -143,7 +143,11 @@ def limit_cycle(
     (True, True, True)
     """
     if settings is None:
-        options = {"rtol": 1e-10, "engine": "compiled" if is_fast() else "ifelse", **options}
+        options = {
+            "rtol": 1e-10,
+            "engine": "compiled" if has_machine_code() else "ifelse",
+            **options,
+        }
     chosen = Settings.of(settings, "limit_cycle", **options)
     what = mounted(model, rig, chosen.held_period)
     if period is not None:
@@ -172,6 +176,7 @@ class _Search:
 
     what: Mounted
     chosen: Settings
+    initial: Mapping[str, Any]
     t: float
     period: float
     y: FloatArray
@@ -189,8 +194,7 @@ class _Search:
             raise ParameterError(
                 "the system is driven by something that changes with time",
                 place="period",
-                value=None,
-                advice="give its period",
+                advice="give the period of that",
             )
         sizes = np.maximum(np.abs(whole.rows.y).max(axis=0), 1e-300)
         span, first = period, -1
@@ -202,11 +206,12 @@ class _Search:
         count = near.program.layout.n
         t, y = float(whole.t[row]), np.array(whole.rows.y[row])
         mode = whole.rows.mode[row, :count].tolist()
-        return cls(what, chosen, t, span, y, mode, sizes, basis, drift)
+        return cls(what, chosen, near.initial or {}, t, span, y, mode, sizes, basis, drift)
 
     def problem(self, y: FloatArray, period: float) -> Problem:
         """Return one period as a run."""
-        start = Problem.on(self.what, self.t + period, self.chosen, t_start=self.t)
+        end = self.t + period
+        start = Problem.on(self.what, end, self.chosen, t_start=self.t, initial=self.initial)
         return replace(start, y=y.tolist(), mode=list(self.mode))
 
     def cycle(self) -> LimitCycle:
@@ -228,7 +233,11 @@ class _Search:
             scaled = M * self.sizes / self.sizes[:, None]
             A = Q.T @ scaled @ Q
             if not np.isfinite(A).all():
-                raise ParameterError("a switch of the motion grazes: it has no derivative there")
+                raise ParameterError(
+                    "a switch of the motion grazes, and it has no derivative there",
+                    place="near",
+                    advice="trace.trust() of a run with sensitivities says where",
+                )
             f = self.rate(start) - (0.0 if drift is None else drift)
             along = Q.T @ (f / self.sizes)
             if same and (residual < RESIDUAL or (residual < 1e3 * RESIDUAL and residual >= before)):
@@ -267,13 +276,13 @@ def _newton(A: FloatArray, R: FloatArray, along: FloatArray | None) -> tuple[Flo
     """Return the step of the state, across the motion, and of the period."""
     eye = np.eye(len(R))
     if along is None:
-        found: FloatArray = np.linalg.lstsq(A - eye, -R, rcond=None)[0]
-        return found, 0.0
+        whole: Any = np.linalg.lstsq(A - eye, -R, rcond=None)[0]
+        return whole, 0.0
     size = float(np.linalg.norm(along)) or 1.0
     unit = along[:, None] / size
     matrix = np.block([[A - eye, unit], [unit.T, np.zeros((1, 1))]])
     whole = np.linalg.lstsq(matrix, np.append(-R, 0.0), rcond=None)[0]
-    return np.array(whole[:-1], dtype=np.float64), float(whole[-1]) / size
+    return whole[:-1], float(whole[-1]) / size
 
 
 def _multipliers(A: FloatArray, along: FloatArray | None) -> NDArray[np.complex128]:

@@ -35,6 +35,7 @@ from gms_fsm.app.verbs.fit import fit_command
 from gms_fsm.app.verbs.runs import (
     class_command,
     copy_command,
+    cycle_command,
     dap_command,
     debug_command,
     lesson_command,
@@ -216,6 +217,7 @@ app.command("paper", cls=_Verb)(paper_command)
 app.command("run", cls=_Verb)(run_command)
 app.command("copy", cls=_Verb)(copy_command)
 app.command("sweep", cls=_Verb)(sweep_command)
+app.command("cycle", cls=_Verb)(cycle_command)
 app.command("fit", cls=_Verb)(fit_command)
 app.command("phenomena", cls=_Verb)(phenomena_command)
 app.command("schema", cls=_Verb)(schema_command)

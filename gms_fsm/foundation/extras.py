@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 from gms_fsm.errors import MissingExtraError, why
@@ -31,6 +32,11 @@ EXTRAS: Mapping[str, tuple[str, str]] = {
     "gymnasium": ("the environment needs", "FrictionState steps in any loop"),
     "check": ("checking a chart needs", "a chart runs without its proofs"),
 }
+
+
+def has_machine_code() -> bool:
+    """Return whether engine 'compiled' can be used."""
+    return all(map(find_spec, ("llvmlite", "platformdirs")))
 
 
 def require(module: str, extra: str) -> Any:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.foundation.extras import has_machine_code
 from gms_fsm.gradients.linear import Linear
 from gms_fsm.lowering.compiling import notify, packed, store, text_of
 from gms_fsm.lowering.program import Program
@@ -18,11 +18,6 @@ from integrators.runners.varying import VaryArguments, vary, work
 from integrators.steps import coefficients
 
 METHOD = coefficients(METHODS["dp45"])
-
-
-def is_fast() -> bool:
-    """Return whether machine code can be made."""
-    return all(map(importlib.util.find_spec, ("llvmlite", "platformdirs")))
 
 
 @dataclass(eq=False)
@@ -142,7 +137,7 @@ class Arcs:
     @functools.cached_property
     def _machine_code(self) -> tuple[Any, Any] | None:
         """The function and a block of its own; None without machine code."""
-        if not is_fast():
+        if not has_machine_code():
             return None
         from integrators.machine_code.layout import MemoryBlock
 

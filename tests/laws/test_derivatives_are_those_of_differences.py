@@ -20,7 +20,8 @@ ZOO = [
     if name not in ("lugre", "bouc-wen")  # the latter's numbers bound each other
 ]
 OTHERS = (
-    "pulled mass", "slider", "velocity window", "coulomb", "runs down", "system pushed against a stop",
+    "pulled mass", "slider", "velocity window", "coulomb", "runs down",
+    "system pushed against a stop",
     "conditions that last", "wear, pulled", "loads", "system servo", "system pulled mass",
     "system ball", "system two blocks", "system impact", "system gear box",
     "system clutched bearings", "supervisor clutches", "supervisor valve", "supervisor hot brake",

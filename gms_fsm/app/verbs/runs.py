@@ -28,6 +28,8 @@ from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.files import write_text
 from gms_fsm.scenarios import shipped, titles
 
+SHOWN = 6  # multipliers
+
 
 class EngineName(enum.StrEnum):
     """Engine that executes the chart."""
@@ -155,6 +157,42 @@ def copy_command(
         )
     write_text(path, known[name].read_text(encoding="utf-8"))
     say(f"{path}; run it with: gms-fsm run {path}")
+
+
+def cycle_command(
+    scenario: ScenarioFile,
+    period: Annotated[
+        float | None,
+        typer.Option(
+            help="Period of what drives the system, s; else where to begin.", show_default=False
+        ),
+    ] = None,
+    overrides: Overrides = None,
+) -> None:
+    """Find the periodic motion that a scenario ends near, and say whether it is stable."""
+    from gms_fsm import Settings, limit_cycle, simulate
+    from gms_fsm.app.scenario import load_scenario
+    from gms_fsm.foundation.extras import has_machine_code
+
+    loaded = load_scenario(scenario, overrides or [])
+    how = {key: loaded.arguments[key] for key in ("t_start", "initial") if key in loaded.arguments}
+    subject: Any
+    *subject, t_end = loaded.subject
+    engine = "compiled" if has_machine_code() else "ifelse"
+    settings = Settings(rtol=1e-8, engine=engine)
+    near = simulate(*subject, t_end=t_end, settings=settings, **how)
+    found = limit_cycle(*subject, near=near, period=period)
+    word = "stable" if found.stable else "unstable"
+    say(f"period      {found.period:.12g} s, {word}")
+    for each in found.multipliers[:SHOWN]:
+        angle = f" at {math.degrees(math.atan2(each.imag, each.real)):.4g} deg" if each.imag else ""
+        say(f"multiplier  {abs(each):.6g}{angle}" if angle else f"multiplier  {each.real:.6g}")
+    if (more := len(found.multipliers) - SHOWN) > 0:
+        say(f"            and {more} smaller ones")
+    say(f"the state returns to {found.residual:.2g} of its size, after {found.iterations} runs")
+    log, start = found.trace.transitions, float(found.trace.t[0])
+    for t, edge in zip((log.t - start).tolist(), log.edge.tolist(), strict=True):
+        say(f"{t:12.9g} s  {edge}")
 
 
 def sweep_command(
