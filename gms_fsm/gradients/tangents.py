@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.language import derivative, names_in, parse_value, spell
 from gms_fsm.language.tree import Number, Value
 from gms_fsm.lowering.generated import SIGNALS, CarefulText, ieee, load
@@ -68,11 +67,11 @@ def tangents(program: Program, active: Places) -> Mapping[str, Any]:
             advice="give the signal as an expression or as corners",
             key=("sensitivities",),
         )
-    return _made(ByIdentity(program.functions), program.source, program.plan.title, active)
+    return _made(program.source, program.plan.title, active)
 
 
 @functools.lru_cache(maxsize=64)
-def _made(_: ByIdentity[Any], source: str, title: str, active: Places) -> Mapping[str, Any]:
+def _made(source: str, title: str, active: Places) -> Mapping[str, Any]:
     text = with_tangents(source, active)
     fast, careful = load(title, text, SIGNALS), CarefulText(title, text, SIGNALS)
     functions = {name: ieee(fast[name], careful[name]) for name in FUNCTIONS}

@@ -176,12 +176,11 @@ def cycle_command(
 
     loaded = load_scenario(scenario, overrides or [])
     how = {key: loaded.arguments[key] for key in ("t_start", "initial") if key in loaded.arguments}
-    subject: Any
-    *subject, t_end = loaded.subject
+    given: Any = loaded.subject
     engine = "compiled" if has_machine_code() else "ifelse"
     settings = Settings(rtol=1e-8, engine=engine)
-    near = simulate(*subject, t_end=t_end, settings=settings, **how)
-    found = limit_cycle(*subject, near=near, period=period)
+    near = simulate(*given, settings=settings, **how)
+    found = limit_cycle(*given[:-1], near=near, period=period)
     word = "stable" if found.stable else "unstable"
     say(f"period      {found.period:.12g} s, {word}")
     for each in found.multipliers[:SHOWN]:
