@@ -36,7 +36,7 @@ ALIKE = 1e-7  # times of switches that differ by less have one derivative
 ROUNDING = 1e-12  # of the length of a run
 SHORT = 64.0  # ticks: an arc that a switch has ended at once
 NOTHING = 1e-9  # of the natural size of a margin's derivative
-GRAZING = 1e-5  # of the mean rate of a margin over its last step
+GRAZING = 1e-4  # of the mean rate of a margin over its last step
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,80 @@
+"""What a trace says of its derivatives: by name, at rows, at ties, and where a switch grazes."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, simulate
+from gms_fsm.traces.trace import Trace
+from tests.helpers import pulled_mass, stick_slip
+
+
+def touching(height: float) -> Trace:
+    """A variable that rises to 0.5 at t = 1, and a guard at some height."""
+    chart = Chart(
+        "touches",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("h", "k"),
+        states=(State("below", flow={"z": "v"}), State("above", flow={"z": "2 * v"})),
+        transitions=(Transition("reach", "below", "above", guard="z > h"),),
+        outputs={"F": "k * z"},
+    )
+    model = ChartModel(chart, {"h": height, "k": 2.0})
+    return simulate(model, Prescribed("1 - t"), 1.5, sensitivities=("h", "k", "initial.z"))
+
+
+def test_a_crossing_has_the_derivative_of_its_root():
+    trace = touching(0.375)
+    t = 0.5  # t - t**2/2 = 0.375
+    assert trace.sensitivity("transitions", "h") == pytest.approx([1.0 / (1.0 - t)])
+    assert trace.sensitivity("transitions", "initial.z") == pytest.approx([-1.0 / (1.0 - t)])
+    # behind it z = h + 2 (z1(t) - h), with z1 the way without the switch
+    assert trace.sensitivity("z", "h")[-1] == pytest.approx([-1.0])
+    assert trace.sensitivity("z", "initial.z")[-1] == pytest.approx([2.0])
+    assert trace.sensitivity("F", "k")[-1] == pytest.approx(trace.z[-1, 0])
+
+
+def test_a_grazing_switch_has_none_and_says_so():
+    trace = touching(0.5 - 1e-11)
+    assert len(trace.transitions) == 1
+    assert np.isnan(trace.sensitivity("z", "h")[-1]).all()
+    (found,) = trace.trust().of("sensitivity")
+    assert found.severity == "warning"
+    assert found.t == pytest.approx(1.0, abs=1e-5)
+    assert "z > h" in found.text
+
+
+def test_elements_that_switch_by_one_guard_on_v_have_a_derivative():
+    trace = simulate(
+        stick_slip("signed"), Prescribed("0.2*sin(2*pi*t/20)"), 13.0, sensitivities=("v_c", "C1")
+    )
+    arrests = trace.transitions.edge == "arrest"
+    assert arrests.sum() == 4
+    slopes = trace.sensitivity("transitions", "v_c")[arrests]
+    np.testing.assert_allclose(slopes, -1.0 / (0.2 * 2 * np.pi / 20), rtol=1e-6)
+    assert trace.trust().of("sensitivity") == ()
+
+
+def test_requested_rows_have_the_derivatives_of_all_rows():
+    model, rig = pulled_mass()
+    names = ("F_s", "initial.v")
+    every = simulate(model, rig, 6.0, rtol=1e-9, sensitivities=names)
+    some = simulate(model, rig, 6.0, rtol=1e-9, sensitivities=names, t_eval=every.t[5:-5:40])
+    at = np.searchsorted(every.t, some.t, "right") - 1
+    for of in ("z", "F", "v"):
+        one, other = (trace.sensitivity(of, "F_s") for trace in (some, every))
+        np.testing.assert_allclose(one, other[at], atol=1e-6 * np.abs(other).max())
+    end = simulate(model, rig, 6.0, rtol=1e-9, sensitivities=names, output="end")
+    np.testing.assert_allclose(
+        end.sensitivity("v", "F_s"), every.sensitivity("v", "F_s")[-1:], 1e-6
+    )
+
+
+def test_they_travel_with_a_trace():
+    trace = touching(0.375)
+    again = pickle.loads(pickle.dumps(trace))
+    assert np.array_equal(again.sensitivity("F", "h"), trace.sensitivity("F", "h"))
