@@ -71,6 +71,7 @@ from gms_fsm import (
     generate,
     initial_bank,
     linearize,
+    limit_cycle,
     measure_phenomena,
     prove,
     simulate,
@@ -2097,6 +2098,59 @@ for name, row in rows.items():
         row[0], ExpressionError if name.startswith("end at") else ParameterError
     )
     group("run", error, lambda given: ended(**given), {name: row})
+
+
+# --------------------------------------------------------------------------- derivatives
+def derived(names: Any, of: str = "v", to: str = "F_s", rig: Any = None, **how: Any) -> None:
+    """Ask a run of the pulled mass for derivatives."""
+    model, pulled = pulled_mass()
+    trace = simulate(model, pulled if rig is None else rig, 0.1, sensitivities=names, **how)
+    trace.sensitivity(of, to)
+
+
+_TOUCH = {"events": "step", "max_step": 0.01}
+rows = {
+    "by what is unknown": ("", ..., lambda: derived(["F_x"])),
+    "by an initial value that is unknown": ("sensitivities", ..., lambda: derived(["initial.w"])),
+    "by one number twice": ("sensitivities", ..., lambda: derived(["F_s", "F_s"])),
+    "by what stands in the text": ("sensitivities", "delta", lambda: derived(["delta"])),
+    "of what is unknown": ("of", "w", lambda: derived(["F_s"], "w")),
+    "by another one": ("to", "k1", lambda: derived(["F_s"], to="k1")),
+    "without any": ("sensitivity", ..., lambda: derived([])),
+    "of switches not located": ("events", "step", lambda: derived(["F_s"], **_TOUCH)),
+    "until": ("until", "v > 1", lambda: derived(["F_s"], until="v > 1")),
+    "of a Python function": (
+        "signal 'v'",
+        ...,
+        lambda: derived(["F_s"], rig=Prescribed(lambda t: 0.1 * t)),
+    ),
+    "at other rows": (
+        "sensitivity",
+        ...,
+        lambda: (
+            simulate(*pulled_mass(), 0.1, sensitivities=["F_s"])
+            .sample([0.05])
+            .sensitivity("v", "F_s")
+        ),
+    ),
+    "cycle from nowhere": ("near", ..., lambda: limit_cycle(*pulled_mass())),
+    "cycle near no trace": ("near", 3.0, lambda: limit_cycle(*pulled_mass(), near=3.0)),
+    "cycle without a return": (
+        "near",
+        ...,
+        lambda: limit_cycle(*pulled_mass(), near=simulate(*pulled_mass(), 0.1)),
+    ),
+    "cycle of what is driven": (
+        "period",
+        ...,
+        lambda: limit_cycle(
+            pulled_mass()[0],
+            Slider(1.0, "sin(t)"),
+            near=simulate(pulled_mass()[0], Slider(1.0, "sin(t)"), 0.5),
+        ),
+    ),
+}
+group("derivatives", ParameterError, lambda make: make(), rows)
 
 
 # --------------------------------------------------------------------------- sweeps

@@ -38,7 +38,10 @@ def test_stick_slip_has_the_period_of_the_closed_form(rig):
     assert cycle.stable
     assert cycle.residual < 1e-10
     assert cycle.iterations <= 8
-    assert sorted(edge.split("_")[0] for edge in cycle.trace.transitions.edge) == ["arrest", "release"]
+    assert sorted(edge.split("_")[0] for edge in cycle.trace.transitions.edge) == [
+        "arrest",
+        "release",
+    ]
 
 
 def test_multipliers_are_those_of_differences():
