@@ -130,7 +130,7 @@ class _Crossing:
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class RunAsRecorded:
     """A run as it was recorded.
 
     Parameters
@@ -160,7 +160,7 @@ class Follower:
         Time, state and modes at the start, and the last time.
     directions : Directions
         Those of the tangents.
-    recorded : Recorded, optional
+    recorded : RunAsRecorded, optional
         What machine code has recorded of the run: the loop then goes from stop to stop.
     """
 
@@ -170,7 +170,7 @@ class Follower:
         options: LoopOptions,
         start: tuple[float, list[float], list[int], float],
         directions: Directions,
-        recorded: Recorded | None = None,
+        recorded: RunAsRecorded | None = None,
     ) -> None:
         self.program, self.directions = program, directions
         self.linear = Linear(program, directions)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.gradients.tangents import Places, tangents
+from gms_fsm.gradients.tangents import ActiveNumbers, tangents
 from gms_fsm.lowering.observing import armed
 from gms_fsm.lowering.program import Program
 from integrators.sliding import go_back, go_to
@@ -43,9 +43,9 @@ class Directions:
     scales: FloatArray
 
     @cached_property
-    def places(self) -> Places:
+    def places(self) -> ActiveNumbers:
         """Which numbers change."""
-        return Places(frozenset(self.shared), frozenset(self.own))
+        return ActiveNumbers(frozenset(self.shared), frozenset(self.own))
 
     @property
     def count(self) -> int:

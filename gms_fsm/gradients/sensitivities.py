@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.arguments import unknown
-from gms_fsm.gradients.following import Followed, Follower, Recorded
+from gms_fsm.gradients.following import Followed, Follower, RunAsRecorded
 from gms_fsm.gradients.linear import Directions, Linear
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.program import Program
 from integrators import LoopOptions
 
 
-class Table(Protocol):
+class TraceRows(Protocol):
     """The rows of a run."""
 
     @property
@@ -56,7 +56,7 @@ class Sensitivities:
         options: LoopOptions,
         start: tuple[float, list[float], list[int], float],
         directions: Directions,
-        recorded: Recorded | None = None,
+        recorded: RunAsRecorded | None = None,
     ) -> Sensitivities:
         """Differentiate a run."""
         return cls(directions, Follower(program, options, start, directions, recorded).follow())
@@ -72,7 +72,7 @@ class Sensitivities:
         return self.followed.times[:, self.column(to)]
 
     def at_rows(
-        self, program: Program, rows: Table, of: str, to: str, which: str = ""
+        self, program: Program, rows: TraceRows, of: str, to: str, which: str = ""
     ) -> FloatArray:
         """Return the derivatives of a quantity at the rows of the run."""
         c, layout = self.column(to), program.layout

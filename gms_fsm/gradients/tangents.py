@@ -29,7 +29,7 @@ ROUNDING = 1e-12  # a difference that is set to 0 below this, relative to its te
 
 
 @dataclass(frozen=True)
-class Places:
+class ActiveNumbers:
     """Which numbers of a program have tangents: by their places among its arguments.
 
     Parameters
@@ -42,7 +42,7 @@ class Places:
     own: frozenset[int]
 
 
-def tangents(program: Program, active: Places) -> Mapping[str, Any]:
+def tangents(program: Program, active: ActiveNumbers) -> Mapping[str, Any]:
     """Return the functions of a program with tangents, their ``"text"``, and the ``"plain flow"``.
 
     Each takes its own arguments, and then the tangents of t, y, the numbers (shared, own), and of
@@ -53,7 +53,7 @@ def tangents(program: Program, active: Places) -> Mapping[str, Any]:
     >>> from gms_fsm import GMS, GMSParameters, Prescribed
     >>> from gms_fsm.lowering.program import lower
     >>> program = lower(GMS(GMSParameters.paper("stick-slip"), law="signed"), Prescribed("2*t"))
-    >>> flow = tangents(program, Places(frozenset(), frozenset()))["flow"]
+    >>> flow = tangents(program, ActiveNumbers(frozenset(), frozenset()))["flow"]
     >>> dy, slope, size = [0.0] * 5, [0.0] * 5, program.layout.y.size
     >>> flow(1.0, [0.0] * size, [0] * 4, [0.0], program.p, dy, 1.0, [0.0] * size, ([], []), slope)
     >>> dy[0], slope[0]
@@ -71,14 +71,14 @@ def tangents(program: Program, active: Places) -> Mapping[str, Any]:
 
 
 @functools.lru_cache(maxsize=64)
-def _made(source: str, title: str, active: Places) -> Mapping[str, Any]:
+def _made(source: str, title: str, active: ActiveNumbers) -> Mapping[str, Any]:
     text = with_tangents(source, active)
     fast, careful = load(title, text, SIGNALS), CarefulText(title, text, SIGNALS)
     functions = {name: ieee(fast[name], careful[name]) for name in FUNCTIONS}
     return functions | {"text": text, "plain flow": fast["flow"]}
 
 
-def with_tangents(source: str, active: Places, names: Iterable[str] = FUNCTIONS) -> str:
+def with_tangents(source: str, active: ActiveNumbers, names: Iterable[str] = FUNCTIONS) -> str:
     """Return the text of some functions with tangents, and all constants of the text."""
     body: list[ast.stmt] = []
     for part in ast.parse(source).body:
@@ -90,7 +90,7 @@ def with_tangents(source: str, active: Places, names: Iterable[str] = FUNCTIONS)
     return ast.unparse(ast.fix_missing_locations(ast.Module(body, [])))
 
 
-def _function(function: ast.FunctionDef, active: Places) -> ast.FunctionDef:
+def _function(function: ast.FunctionDef, active: ActiveNumbers) -> ast.FunctionDef:
     """Return a function with tangents."""
     filled = [arg.arg for arg in function.args.args if arg.arg in VECTORS[1:]]
     arguments = [MARK + name for name in ("t", "y", "p", *filled)]
@@ -103,7 +103,7 @@ def _function(function: ast.FunctionDef, active: Places) -> ast.FunctionDef:
 class _Writer:
     """Writes the assignments of tangents of one function."""
 
-    def __init__(self, active: Places, function: ast.FunctionDef) -> None:
+    def __init__(self, active: ActiveNumbers, function: ast.FunctionDef) -> None:
         self.places = active
         self.active = {"t", *VECTORS}
         while True:  # until no more names depend on something that has a tangent

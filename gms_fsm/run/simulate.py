@@ -13,7 +13,7 @@ import integrators
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.foundation.arguments import checked_path, refusing
 from gms_fsm.gradients.directions import directions_of
-from gms_fsm.gradients.following import Recorded
+from gms_fsm.gradients.following import RunAsRecorded
 from gms_fsm.gradients.linear import Directions
 from gms_fsm.gradients.sensitivities import Sensitivities
 from gms_fsm.lowering.program import equations
@@ -229,7 +229,7 @@ def derived(start: Problem, directions: Directions, trace: Trace) -> Sensitiviti
         once = replace(start, chosen=ends, options=replace(start.options, times=[start.last]))
         stops = trace.stops if start.output == "t_eval" else simulated(once).stops
         rows = trace.rows if start.output == "all" else stops
-        recorded = Recorded(rows.t.tolist(), np.asarray(rows.y), stops.t.tolist(), stops.y)
+        recorded = RunAsRecorded(rows.t.tolist(), np.asarray(rows.y), stops.t.tolist(), stops.y)
     return Sensitivities.of(start.program, options, begin, directions, recorded)
 
 

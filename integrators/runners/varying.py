@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from integrators.step_size import root_of
 from integrators.steps import Coefficients, Vector, weighted_sum
 
-__all__ = ["VaryArguments", "Work", "vary", "work"]
+__all__ = ["TangentWork", "VaryArguments", "vary", "work"]
 
 SAFE, LEAST, MOST = 0.9, 0.2, 3.0  # of the step control
 ORDER = 5
@@ -23,7 +23,7 @@ SMALLEST = 1e-300
 TICK = 4.0 * ROUNDING
 
 
-class Work(NamedTuple):
+class TangentWork(NamedTuple):
     """Scratch space for one step."""
 
     k: list[Vector]  # slopes of the stages, and at the end, shape (stages + 1, m)
@@ -54,10 +54,10 @@ class VaryArguments(NamedTuple):
     sizes: Any  # the largest value of each component
     scales: Any  # how much the numbers of each direction change at most
     tolerance: Any  # the relative one, then the absolute ones
-    work: Work
+    work: TangentWork
 
 
-def work(size: int, own: int, longest: int, shared: int, stages: int) -> Work:
+def work(size: int, own: int, longest: int, shared: int, stages: int) -> TangentWork:
     """Return scratch space."""
 
     def vector() -> Vector:
@@ -68,7 +68,7 @@ def work(size: int, own: int, longest: int, shared: int, stages: int) -> Work:
 
     rows = [[0.0] * longest for _ in range(own)]
     a, b, c, d, e, f = (vector() for _ in range(6))
-    return Work(slopes(), slopes(), a, b, c, d, e, f, rows, [0.0] * shared)
+    return TangentWork(slopes(), slopes(), a, b, c, d, e, f, rows, [0.0] * shared)
 
 
 def vary(
@@ -85,7 +85,7 @@ def vary(
     sizes: Vector,
     scales: Vector,
     tolerance: Vector,
-    w: Work,
+    w: TangentWork,
     directions: int,
     count: int,
 ) -> int:
@@ -129,7 +129,7 @@ def vary(
     return steps
 
 
-def _set_numbers(move: Vector, w: Work) -> None:
+def _set_numbers(move: Vector, w: TangentWork) -> None:
     """Set what the numbers change by in one direction."""
     at = len(w.shared)
     for k in range(at):
@@ -150,7 +150,7 @@ def _step(
     t: float,
     h: float,
     end: float,
-    w: Work,
+    w: TangentWork,
 ) -> None:
     """Take a step of the state and of its tangent."""
     A, B, C = method.A, method.B, method.C
@@ -169,7 +169,7 @@ def _step(
 
 
 def _error(
-    h: float, method: Coefficients, sizes: Vector, scale: float, tolerance: Vector, w: Work
+    h: float, method: Coefficients, sizes: Vector, scale: float, tolerance: Vector, w: TangentWork
 ) -> float:
     """Return the error of the step in units of the tolerances: that of the worst component."""
     stages, rtol, worst, most = len(method.B), tolerance[0], 0.0, 0.0
@@ -185,7 +185,7 @@ def _error(
     return worst
 
 
-def _accept(stages: int, w: Work) -> None:
+def _accept(stages: int, w: TangentWork) -> None:
     """Go to the end of the step."""
     first, last, first_t, last_t = w.k[0], w.k[stages], w.k_t[0], w.k_t[stages]
     for j in range(len(w.y)):
