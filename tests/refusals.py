@@ -366,6 +366,8 @@ rows = {
     "text for a tolerance": (END, f'{END}\natol = "small"'),
     "text in a table of tolerances": (END, f'{END}\natol = {{ z = "small" }}'),
     "empty run": (f"{END}\n", ""),
+    "rig by its class": ('kind = "prescribed"', 'kind = "PulledSlider"'),
+    "one C for two elements": (ONE_C, "C = [0.1]"),
 }
 group("key of a scenario", ScenarioError, edited, rows, "a.toml")
 rows = {
@@ -381,6 +383,18 @@ group("key of a scenario", ScenarioError, edited, rows)
 rows = {
     "end before the start": ("a.toml: line 16: run.t_end", -1.0, END, "t_end = -1.0"),
     "end at the start": ("a.toml: line 16: run.t_end", 0.0, END, "t_end = 0"),
+    "end too far": (
+        "a.toml: line 16: run.t_end",
+        1e300,
+        f"{END}\n\n[output]\n",
+        "t_end = 1e300\n[output]\nevery = 0.1\n",
+    ),
+    "rows that are counted": (
+        "a.toml: line 18: output.every",
+        1000.0,
+        f"{END}\n\n[output]\n",
+        f"{END}\n[output]\nevery = 1000\n",
+    ),
     "stiffness below zero": ("rig.stiffness", -5.0, RIG, PULLED),
 }
 group("run of a scenario", ScenarioError, edited, rows)
@@ -523,6 +537,7 @@ rows = {
     "no number": ("--vary", "F_s=low..high", "F_s=low..high"),
     "not a range": ("--vary", "F_s=2", "F_s=2"),
     "beside the value": ("vary['F_s']", (2.0, 3.0), "F_s=2..3"),
+    "highest value first": ("vary['F_s']", (3.0, 0.5), "F_s=3..0.5"),
     "no such number": ("", ..., "F_x=2..3"),
     "printed with its value": ("vary['delta']", 2.0, "delta"),
 }
@@ -1320,6 +1335,9 @@ rows = {
     "long array": (b'name = "a"\nstate = [\n' + b"{},\n" * 4_000 + b"]\nq = 1\n",),
     "too large": (b"#" * 1_100_000,),
     "deep": (b"name = " + b"[" * 5000,),
+    "archive": (b"PK\x03\x04\x14\x00",),
+    "JSON": (b'{"state": []}',),
+    "XML": (b'<?xml version="1.0"?><scxml/>',),
 }
 group("file that is no chart", ChartError, chart_bytes, rows, "own.toml")
 rows = {
@@ -1913,7 +1931,7 @@ wrong: dict[str, tuple[Any, ...]] = {
     "events": ("never", None),
     "engine": ("turbo",),
     "output": ("rows", 3, True),
-    "t_eval": (["a"], "often"),
+    "t_eval": (["a"], "often", 0.5),
     "initial": (5, [1.0] * 4),
     "settings": ({"rtol": 1e-3},),
 }
@@ -1949,7 +1967,6 @@ rows = {
     "row before the start": ({"t_eval": [-0.5, 0.5]},),
     "rows out of order": ({"t_eval": [0.1, 0.5, 0.2]},),
     "row twice": ({"t_eval": [0.1, 0.5, 0.5]},),
-    "row that is no list": ({"t_eval": 0.5},),
     "rows in rows": ({"t_eval": [[0.1, 0.2]]},),
     "t_eval without times": ({"output": "t_eval"},),
     "the end, and times": ({"output": "end", "t_eval": [0.5]},),
@@ -2187,6 +2204,7 @@ rows = {
     "unknown engine": ("engine", "turbo", {"engine": "turbo"}),
     "negative tolerance": ("rtol", -1.0, {"rtol": -1}),
     "unknown initial value": ("", ..., {"initial": {"q": 1}}),
+    "what varies, as in play": ("", ..., {"vary": {"F_s": (0.5, 3.0)}}),
 }
 group("option of a sweep", ParameterError, lambda how: sweeping({"F_s": [1.5]}, **how), rows)
 
@@ -2905,6 +2923,7 @@ rows = {
     "machine too many": ("log_machine", lambda a: a + 99),
     "numbers of the log are one too few": ("log_numbers", lambda a: a[:, :-1]),
     "header is numbers": ("header", lambda a: np.zeros(3)),
+    "header is an object": ("header", lambda a: np.array({}, dtype=object)),
     "header is no JSON": ("header", lambda a: np.array("{not json")),
     "header is a list": ("header", lambda a: np.array("[]")),
     "header is deep": ("header", lambda a: np.array("[" * 100_000)),

@@ -128,8 +128,11 @@ class _Verb(TyperCommand):
         ]
         if "--set" in known and "--law" in args:
             yield "A scenario has its law as a key: --set model.law=signed"
+        over = "--over" in known and "--over" not in args
         for each in alone:
-            if "--set" in known and re.fullmatch(r"[\w.]+=.*", each):
+            if over and re.fullmatch(r"[\w.]+=.*", each):
+                yield f"What varies is named by --over {each.partition('=')[0]}=from:to:count"
+            elif "--set" in known and re.fullmatch(r"[\w.]+=.*", each):
                 yield f"A key is changed by --set {each}"
             if "--law" in known and each in LAWS:
                 yield f"A law is chosen by --law {each}"
@@ -144,6 +147,9 @@ class _Verb(TyperCommand):
             yield f"What is written is named by -o {extra[1]}"
         elif surplus := re.search(r"unexpected extra argument.*\(([^\s)]+)", message):
             yield from self._one_alone(args, surplus[1])
+        ends = any("ending in" in str(getattr(param, "help", "")) for param in self.params)
+        if ends and {"--to", "--format"} & ({*args} - known):
+            yield "What it becomes is said by the ending of its name: -o NAME.pdf"
         option = re.match(r"No such option:? '?(-+([\w-]+))", message)
         name = option[2].replace("-", "_") if option else ""
         keys = [each for each in RunTable.model_fields if name and each.startswith(name)]

@@ -29,13 +29,14 @@ from gms_fsm.app._tables import (
     SystemScenario,
 )
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.errors import GMSError, RecordError, ScenarioError, cut
+from gms_fsm.errors import GMSError, ParameterError, RecordError, ScenarioError, cut
 from gms_fsm.foundation.arguments import no_file, some_of, unknown
 from gms_fsm.foundation.files import inside
 from gms_fsm.foundation.tables import read
 from gms_fsm.foundation.toml import Key, TomlFile, parsed
 from gms_fsm.records.motion import Motion
 from gms_fsm.records.record import Record
+from gms_fsm.run.problem import checked_times
 from gms_fsm.run.simulate import simulate
 from gms_fsm.scenarios import scenario_path, shipped
 from gms_fsm.session.session import Session
@@ -353,11 +354,11 @@ def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
     run = scenario.run
     start, end = run.t_start or 0.0, run.t_end
     if end is None:
-        raise ScenarioError(
+        missing = ScenarioError(
             "run.t_end is missing",
-            place=str(path),
             advice="add a table [run] with t_end in s, or give --set run.t_end=10.0",
         )
+        raise file.blamed(missing, ("run",))
     _check_end(file, start, end)
     arguments = run.options() | {"t_start": start, "t_end": end}
     if initial := scenario.initial_values():
@@ -371,8 +372,12 @@ def _loaded_system(path: Path, overrides: Sequence[str]) -> Loaded:
 
 
 def _check_end(file: TomlFile, start: float, end: float) -> None:
-    """Refuse a run that ends before it starts."""
+    """Refuse a run that ends before it starts, or too late for its clock."""
     if end > start:
+        try:
+            checked_times(start, end)
+        except ParameterError as error:
+            raise file.blamed(error, ("run", error.place)) from None
         return
     if "t_end" in file.data.get("run", {}):
         late = f"it must be later than t_start, {start!r}"
@@ -383,7 +388,15 @@ def _check_end(file: TomlFile, start: float, end: float) -> None:
 
 def _rows(file: TomlFile, every: float, start: float, end: float) -> FloatArray:
     """Return the times of the rows."""
-    wanted = max(0.0, (end - start) / every)  # t_end is checked later
+    wanted = (end - start) / every
+    if wanted < 1.0:
+        few = ScenarioError(
+            f"it is longer than the run, {end - start:g} s",
+            place="every",
+            value=every,
+            advice=f"it is the time between rows, in s; for 1000 rows {(end - start) / 1000:.3g}",
+        )
+        raise file.blamed(few, ("output", "every"))
     if wanted > MOST_ROWS:
         many = ScenarioError(
             f"it gives {wanted:.4g} rows, and at most {MOST_ROWS:,} can be kept",

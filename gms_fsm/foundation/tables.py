@@ -192,7 +192,9 @@ def _sentence(first: Any, places: Key, data: dict[str, Any], root: type[BaseMode
     if kind == "union_tag_invalid":
         tag, allowed = first["ctx"]["discriminator"].strip("'"), first["ctx"]["expected_tags"]
         given = first["ctx"]["tag"]
-        hint = meant(given, re.findall("'([^']+)'", allowed))
+        tags = re.findall("'([^']+)'", allowed)
+        begun = [tag for tag in tags if str(given).casefold().startswith(tag.casefold())]
+        hint = meant(begun[0] if begun else given, tags)
         return f"{key}.{tag} = {shown(given)}: {hint}it must be one of {allowed}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         inner = _fields_at(places, data, root) if len(places) > 1 else {}

@@ -98,6 +98,13 @@ _USUAL: Sequence[tuple[str, str | Callable[[re.Match[str]], str]]] = (
 )
 
 
+_NOT_TOML = (  # how other files begin
+    (b"PK", "an archive", "Trace.load reads a run, Sweep.load a sweep, gms-fsm replay shows a run"),
+    (b"{", "JSON", "Session.load reads a session, Coverage.load a coverage; else write it as TOML"),
+    (b"<", "XML", "Chart.from_scxml reads SCXML; else write it as TOML"),
+)
+
+
 def parsed(path: Path) -> dict[str, Any]:
     """Return the contents of a scenario file."""
     return data_of(text_of(path), path)
@@ -121,6 +128,9 @@ def text_of(path: Path, kind: type[GMSError] = ScenarioError) -> str:
             place=str(path),
             advice="keep records in separate files",
         )
+    for begin, what, advice in _NOT_TOML:
+        if raw.lstrip().startswith(begin):
+            raise kind(f"it is {what}, not TOML", place=str(path), advice=advice)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -169,7 +169,7 @@ class Problem:
     ) -> Problem:
         """Check the arguments of `gms_fsm.simulate`."""
         chosen, system = settings, what.system
-        t_start, t_end = _times(t_start, t_end)
+        t_start, t_end = checked_times(t_start, t_end)
         _check_resolution(chosen, t_start, t_end)
         program = lower(system)
         scales = scales_of_system(program)
@@ -281,7 +281,8 @@ def _recorded(chosen: Settings, atol: Setting, t_start: float, t_end: float) -> 
     }
 
 
-def _times(t_start: float, t_end: float) -> tuple[float, float]:
+def checked_times(t_start: float, t_end: float) -> tuple[float, float]:
+    """Return start and end of a run, which a clock of floats can resolve."""
     t_start = checked_scalar("t_start", t_start, "finite")
     if np.ndim(t_end):
         raise ParameterError(

@@ -273,6 +273,13 @@ def _check_count(max_steps: object) -> None:
 
 
 def _increasing(t_eval: ArrayLike) -> FloatArray:
+    if isinstance(t_eval, float | int):
+        raise ParameterError(
+            "it must be the times of the rows",
+            place="t_eval",
+            value=t_eval,
+            advice="such as numpy.linspace(0.0, t_end, 100) for 100 of them",
+        )
     wanted = checked_array("t_eval", t_eval, None, "finite")
     wrong = np.flatnonzero(wanted[1:] <= wanted[:-1])
     if wrong.size:

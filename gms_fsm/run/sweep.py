@@ -281,10 +281,12 @@ def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
     known = [each.name for each in fields(Settings)]
     for name, value in options.items():
         if name not in known and isinstance(value, Iterable) and not isinstance(value, str):
+            inner = value if isinstance(value, Mapping) else {name: "[...]"}
+            varied = ", ".join(f"{each!r}: [...]" for each in inner)
             raise ParameterError(
                 f"a sweep takes no argument {name!r}",
                 advice=meant(name, known).strip()
-                or f"what varies is given by its name: parameters={{{name!r}: [...]}}",
+                or f"what varies is given by its name: parameters={{{varied}}}",
             )
     chosen = Settings.of(settings, "a sweep", **options)
     if chosen.output == "all":

@@ -36,7 +36,7 @@ MOST_DELAY = 1000  # ticks; each is a value of the system
 LEAST_LOAD = 1e-9  # N; charts divide by thresholds
 
 
-@refusing()
+@refusing(instead={"mass": "inertia", "m": "inertia", "J": "inertia"})
 @dataclass(frozen=True)
 class Body:
     """A body with one degree of freedom: free, or moved with a given velocity.

@@ -73,6 +73,11 @@ def _names_in(*blocks: tuple[Statement, ...]) -> frozenset[str]:
     return frozenset(names)
 
 
+def assigned(*blocks: tuple[Statement, ...]) -> frozenset[str]:
+    """Return the names of the locals that statements assign to."""
+    return frozenset(u.name for each in _all_in(*blocks) for u in _set_by(each))
+
+
 def _all_in(*blocks: tuple[Statement, ...]) -> Iterator[Statement]:
     for block in blocks:
         for each in block:

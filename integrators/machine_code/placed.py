@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+from integrators.machine_code.locals import assigned
 from integrators.machine_code.tree import (
     Address,
     AddressOf,
@@ -23,19 +24,7 @@ from integrators.machine_code.tree import (
 
 
 def placed(module: Module, known: Mapping[str, Const]) -> Module:
-    """Return a module whose entries have constants for some of their parameters.
-
-    Parameters
-    ----------
-    module : Module
-        Called functions come before the functions that call them.
-    known : mapping of str to Const
-        By the names of parameters of the entries.
-
-    Returns
-    -------
-    Module
-        It computes the same.
+    """Return a module whose entries have constants for parameters of some names.
 
     Examples
     --------
@@ -58,8 +47,11 @@ def placed(module: Module, known: Mapping[str, Const]) -> Module:
             arguments = zip(*(each.arguments for each in calls[function.name]), strict=True)
             same = [a[0] if isinstance(a[0], Const) and len({*a}) == 1 else None for a in arguments]
             named = zip(function.parameters, same, strict=True)
-            given = {each.name: value for each, value in named if value is not None}
-            gone[function.name] = frozenset(k for k, value in enumerate(same) if value is not None)
+            changed = assigned(function.body)
+            given = {u.name: v for u, v in named if v is not None and u.name not in changed}
+            gone[function.name] = frozenset(
+                k for k, each in enumerate(function.parameters) if each.name in given
+            )
         made = replace(function, body=_changed(function.body, _with(given)))
         kept = tuple(each for each in function.parameters if each.name not in given)
         done.append(replace(made, parameters=kept))

@@ -33,6 +33,13 @@ def checked_ranges(
             raise ParameterError(
                 "give its lowest and its highest value", place=f"{argument}[{name!r}]", value=ends
             ) from None
+        if low > high:
+            raise ParameterError(
+                "the lowest value comes first",
+                place=f"{argument}[{name!r}]",
+                value=ends,
+                advice=f"give ({high!r}, {low!r})",
+            )
         if not (low < high and low <= value <= high and math.isfinite(high - low)):
             raise ParameterError(
                 f"it must be a range around {value!r}, the value of the model",

@@ -217,6 +217,38 @@ def test_a_long_run_is_computed_in_a_worker_with_the_same_bits(live: Any) -> Non
     assert page.evaluate("Array.from(runs[0].found.y)") == here
 
 
+def test_while_a_slider_moves_lines_have_the_extremes_of_each_column_of_pixels(live: Any) -> None:
+    page = live("pulled_mass")
+    drawn = """() => views[0].open.right.plots.map(({ plot }) =>
+        plot.data.slice(1).map((u) => [u.length, Math.min(...u.filter(Number.isFinite)),
+                                       Math.max(...u.filter(Number.isFinite))]))"""
+    page.evaluate("turn(dials.get('F_s'), 1.1 * dials.get('F_s').value)")
+    wait(page, "first.frame !== null && sketching")
+    sketched, width = page.evaluate(drawn), page.evaluate("views[0].open.right.width()")
+    wait(page, "!sketching")
+    whole, frames = page.evaluate(drawn), page.evaluate("frames.t.length")
+    assert all(each[0] <= 2 * (width + 1) < frames for lines in sketched for each in lines)
+    assert all(each[0] == frames for lines in whole for each in lines)
+    assert [[each[1:] for each in lines] for lines in sketched] == [
+        [each[1:] for each in lines] for lines in whole
+    ]
+
+
+def test_a_window_may_change_its_size_before_the_first_run(browser: Any, tmp_path: Path) -> None:
+    path = live_scenario("chair_squeak").page(tmp_path / "page.html")
+    page, wrong = browser.new_page(), list[str]()
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.add_init_script(
+        "addEventListener('DOMContentLoaded', () => dispatchEvent(new Event('resize')));"
+        "new MutationObserver(() => dispatchEvent(new Event('resize')))"
+        ".observe(document, { childList: true, subtree: true });"
+    )
+    page.goto(path.as_uri())
+    wait(page, "(document.querySelector('#took') ?? {}).textContent")
+    page.close()
+    assert wrong == []
+
+
 def test_its_policy_has_hashes_only(live: Any) -> None:
     live("servo")
     text = PAGES["servo"].read_text(encoding="utf-8")

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from pydantic import (
     Discriminator,
     Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
     Tag,
     create_model,
     model_validator,
@@ -69,13 +71,18 @@ class GMSTable(Table):
     stribeck: StribeckTable | None = None
     weights: list[float] | None = Field(None, description=_DESCRIBED["weights"])
     shares: list[float] | None = Field(None, description="share of the friction of each element")
+    _integers: frozenset[str] = PrivateAttr(frozenset())  # lists written without a decimal point
 
-    @model_validator(mode="after")
-    def _fits(self) -> GMSTable:
+    @model_validator(mode="wrap")
+    @classmethod
+    def _fits(cls, data: Any, handler: ModelWrapValidatorHandler[GMSTable]) -> GMSTable:
+        made = handler(data)
+        lists = ((k, u) for k, u in data.items() if isinstance(u, list)) if data is not made else ()
+        made._integers = frozenset(k for k, u in lists if all(type(each) is int for each in u))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the warning is issued when the model is built for use
-            self.build()
-        return self
+            made.build()
+        return made
 
     def build(self) -> GMS:
         """Return the model."""
@@ -146,8 +153,11 @@ class GMSTable(Table):
             return
         advice = "give one number for each element"
         for name, value in lists.items():
-            whole = all(each >= 0 and each.is_integer() for each in value)
-            if whole and 0 < len(value) == 2 * min(lengths):
+            if (
+                name in self._integers
+                and min(value, default=0) >= 0
+                and 0 < len(value) == 2 * min(lengths)
+            ):
                 pairs = zip(value[::2], value[1::2], strict=True)
                 numbers = ", ".join(f"{a:.0f}.{b:.0f}" for a, b in pairs)
                 advice = f"a number has a decimal point: {name} = [{numbers}]"

@@ -52,4 +52,10 @@ def member(file: Any, name: str, most: int | None = None) -> Any:
             advice=f"a file of this length allows at most {most}",
         )
     with PARSER:
-        return file[name]
+        try:
+            array = file[name]
+        except (ValueError, SyntaxError, TypeError):  # of NumPy, which speaks of its own format
+            array = b""
+    if isinstance(array, bytes):
+        raise TraceFileError(f"{name} is overwritten, or holds more than numbers and texts")
+    return array

@@ -4,12 +4,13 @@ let data = JSON.parse(document.getElementById("data").textContent); // a host ma
 const $ = (query, root = document) => root.querySelector(query);
 const $$ = (query, root = document) => [...root.querySelectorAll(query)];
 
-// A colour of the style sheet. To ask for one may compute all styles anew: each is asked for once a picture.
+// A colour of the style sheet. To ask for one may compute all styles anew: each is asked for once a picture, and while a run
+// changes with every picture once.
 let colours = null;
 function colour(name) {
   if (!colours) {
     colours = new Map();
-    setTimeout(() => { colours = null; });
+    if (!sketching) setTimeout(() => { colours = null; });
   }
   if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
   return colours.get(name);

@@ -6,7 +6,7 @@ const breakpoints = new Map();
 let frame = 0, following = true, zooming = false;
 const views = [];
 // The runs with a view of their own: not one that is only drawn behind another.
-const shownRuns = () => runs.filter(({ ghost }) => !ghost);
+const shownRuns = () => (runs ?? []).filter(({ ghost }) => !ghost);
 // A wide screen: the page fills it and does not scroll; two runs need more of it than one.
 const isWide = () => presenting.on || (innerHeight >= 520 && innerWidth >= (shownRuns().length > 1 ? 1240 : 1000));
 const keyOf = (view, contact, element, edge) => `${view.place}/${contact.name}/${element}/${edge}`;

@@ -159,7 +159,7 @@ class TimePlots {
 
   close() { for (const { plot } of this.plots) plot.destroy(); }
 
-  recolour() { for (const { plot } of this.plots) plot.redraw(false, true); }
+  recolour() { colours = null; for (const { plot } of this.plots) plot.redraw(false, true); }
 
   show() { this.tell(); this.placeCursor(); }
 
@@ -168,7 +168,7 @@ class TimePlots {
   tell() { for (const { value, at } of this.plots) say(value, at()); }
 
   drawRibbons() {
-    const wide = span.max - span.min;
+    const wide = span.max - span.min, least = sketching ? 1 / this.width() : 5e-4; // of a piece that is drawn
     for (const { contact, i, track } of this.tracks) {
       $(".note", track)?.remove();
       const { run } = contact, pieces = contact.pieces[i], nodes = [...track.children];
@@ -177,7 +177,7 @@ class TimePlots {
         const from = Math.max(k ? run.t(pieces[k].from) : -Infinity, span.min);
         to = k + 1 < pieces.length ? run.t(pieces[k + 1].from) : run.t(run.rows - 1);
         const width = (Math.min(to, span.max) - from) / wide;
-        if (!(width > 5e-4)) continue;
+        if (!(width > least)) continue;
         const piece = nodes[count] ?? make("i", track), look = [pieces[k].mode, (100 * (from - span.min)) / wide, 100 * width].join();
         count += 1;
         if (piece.look === look) continue; // as before

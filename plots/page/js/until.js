@@ -2,6 +2,11 @@
 // The `until` box: a condition on stored values, in the expression language of gms-fsm. It is the only text that
 // Python has not seen. It becomes a tree like those that Python stores, so both are evaluated by the same function.
 // Precedence, functions and constants come from Python; nothing is ever passed to `eval`.
+const CURES = {
+  "=": ": write == for a state, <= or >= for a number", "&": ": write and", "|": ": write or, or abs(...)", "!": ": write not",
+  "^": ": write **", ",": ": a number has a decimal point", ";": ": write and between two conditions",
+};
+
 function parse(text, { levels, negation, sign, functions, constants, units }, names, owners, unitIn) {
   const known = Object.keys(units).sort((a, b) => b.length - a.length).join("|"); // mm/s before m
   const number = `(?<digits>(?:\\d+\\.?\\d*|\\.\\d+)(?:[eE][+-]?\\d+)?)(?:\\s*(?<unit>${known}))?(?!\\w)`;
@@ -11,7 +16,7 @@ function parse(text, { levels, negation, sign, functions, constants, units }, na
   const end = text.trimEnd().length, tokens = [];
   while (pattern.lastIndex < end) {
     const begin = pattern.lastIndex + text.slice(pattern.lastIndex).search(/\S/), found = pattern.exec(text);
-    if (!found) fail(begin, `cannot read ${JSON.stringify(text[begin])}`);
+    if (!found) fail(begin, `cannot read ${JSON.stringify(text[begin])}${CURES[text[begin]] ?? ""}`);
     const word = found[0].trim();
     tokens.push({ word, ...found.groups, at: pattern.lastIndex - word.length });
   }
@@ -64,7 +69,8 @@ function parse(text, { levels, negation, sign, functions, constants, units }, na
     if (Object.hasOwn(constants, word)) return { at, tree: constants[word] };
     if (Object.hasOwn(functions, word)) return call(word, at);
     if (name && Object.hasOwn(names, name)) return { at, tree: name };
-    return fail(at, word ? `unknown ${JSON.stringify(word)}; names are ${Object.keys(names).join(", ")}` : "the text ends too early");
+    const near = Object.keys(names).find((each) => each.toLowerCase() === word.toLowerCase());
+    return fail(at, word ? `unknown ${JSON.stringify(word)}; ${near ? `did you mean ${JSON.stringify(near)}? ` : ""}names are ${Object.keys(names).join(", ")}` : "the text ends too early");
   }
 
   function call(name, at) {
@@ -106,7 +112,7 @@ function parse(text, { levels, negation, sign, functions, constants, units }, na
   }
 
   const tree = as(true, expression(1));
-  return next < tokens.length ? fail(here().at, `cannot be read from ${JSON.stringify(here().word)}`) : tree;
+  return next < tokens.length ? fail(here().at, `cannot be read from ${JSON.stringify(here().word)}${CURES[here().word] ?? ""}`) : tree;
 }
 
 // A condition typed by the user, as a function of the row of a run; throws a SyntaxError with a message.

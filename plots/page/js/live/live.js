@@ -2,6 +2,7 @@
 // The live page: a change of a number computes the run again, and the page shows its rows. The run as it was written stays
 // behind it. A run that takes long is computed in a worker, and of the changes meanwhile the latest wins.
 const PATIENCE = 80; // ms that a run may hold up the page
+const AT_FIRST = 250; // of the first run, which is slower: the worker would begin it again, as slowly
 const SETTLED = 400; // ms without a change, after which the address is written and what changed is read aloud
 const IN_WORKER = `
 const engines = [];
@@ -25,10 +26,10 @@ function wordsNow() {
 }
 
 // Computes a run, here or in the worker, and hands it over with the number of its engine.
-function compute(numbers, then) {
+function compute(numbers, then, patience = PATIENCE) {
   const { number } = live;
   if (!live.slow) {
-    const begin = performance.now(), found = engineNow().run(numbers, PATIENCE);
+    const begin = performance.now(), found = engineNow().run(numbers, patience);
     live.took = performance.now() - begin;
     if (found) { then(found, number); return; }
     live.slow = true;
@@ -296,7 +297,7 @@ function beginLive() {
     if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
     if (isChanged()) changed();
     else showRun(written, 0);
-  });
+  }, AT_FIRST);
   addEventListener("hashchange", () => {
     const t = readAddress();
     changed();

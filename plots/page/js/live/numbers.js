@@ -49,7 +49,7 @@ class Dial {
 
   type(text) {
     const { name, unit } = this, u = typed(text, unit);
-    if (Number.isNaN(u)) refuse(this, `${name}: ${JSON.stringify(text)} is not a number${unit && unit !== "1" ? `, or not in ${unit}` : ""}`);
+    if (Number.isNaN(u)) refuse(this, `${name}: ${JSON.stringify(text)} is not a number${unit && unit !== "1" ? `, or not in ${unit}` : ""}${/^\s*-?\d+,\d+/.test(text) ? `: a number has a decimal point, ${text.trim().replace(",", ".")}` : ""}`);
     else this.turn(u);
   }
 
