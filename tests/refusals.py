@@ -1673,6 +1673,7 @@ rows = {
     "number with another name": ("Stribeck", (Stribeck, 1.0, 1.5), {"vs": 1e-3}),
     "number too few": ("PulledSlider", (PulledSlider, 1.0, 2.0), {}),
     "stiffness of a spring": ("spring 'shaft'", (Spring, "shaft", "motor"), {"stiffness": 2.0}),
+    "mass of a body": ("body 'block'", (Body, "block"), {"mass": 2.0}),
     "sample time": ("sampled 'pid'", (Sampled, "pid"), {"sample_time": 1e-3, "updates": {}}),
     "velocity of a supervisor": ("supervisor 'mode'", (Supervisor, "mode", None), {"v": "w"}),
     "shares": ("GMSParameters.from_shares", (GMSParameters.from_shares,), {"shares": [1.0]}),

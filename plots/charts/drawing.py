@@ -1,4 +1,4 @@
-"""Charts as drawings, whose labels and lines have positions: one element as a graph.
+"""What a chart is as a drawing: labels and lines that have positions.
 
 Lengths are points; y points down.
 """
@@ -9,10 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from plots.charts.cells import Label
-from plots.charts.contents import edges_by_priority
-from plots.charts.labels import edge_id, element_id, part_id
-from plots.charts.layout.layers import LayerEdge, Point, layered, straight
-from plots.charts.layout.placed import placed, ring
+from plots.charts.layout.layers import Point, straight
 
 if TYPE_CHECKING:
     from gms_fsm.charts.chart import Transition
@@ -86,54 +83,6 @@ class Drawing:
     height: float
     nodes: tuple[Node, ...]
     lines: tuple[DrawnLine, ...]
-
-
-def graph_drawing(sheet: ChartSheet, number: int) -> Drawing:
-    """Return an element as states and arrows."""
-    chart, element, cells = sheet.chart, element_id(number), sheet.cells
-    edges = [(edge, priority) for priority, edge in edges_by_priority(chart)]
-    boxes = [
-        cells.guard(sheet.guard_rows(edge, priority, number), edge.name in sheet.marked)
-        for edge, priority in edges
-    ]
-    rows = [sheet.state_rows(state, number) for state in chart.states]
-    plain = [
-        cells.state(own, state.name in sheet.marked)
-        for own, state in zip(rows, chart.states, strict=True)
-    ]
-    links = [
-        LayerEdge(
-            chart.state_index(edge.source), chart.state_index(edge.target), (box.width, box.height)
-        )
-        for (edge, _), box in zip(edges, boxes, strict=True)
-    ]
-    sizes = [(float(box.width), float(box.height)) for box in plain]
-    centres = [chart.layout[each.name] for each in chart.states] if chart.layout else None
-    centres = centres or ring(sizes, links)
-    if centres is None:
-        laid = layered(sizes, links, sheet.direction)
-    else:
-        laid = placed(sizes, links, centres, sheet.direction)
-    names = [part_id(element, "state", state.name) for state in chart.states]
-    dot = f"{element}-default"
-    nodes = [Node(dot, "default", laid.dot)]
-    for state, name, at, size, own in zip(
-        chart.states, names, laid.states, laid.sizes, rows, strict=True
-    ):
-        marked = state.name in sheet.marked
-        kind = "state marked" if marked else "state"
-        nodes.append(Node(name, kind, at, cells.state(own, marked, size)))
-    lines = [default_line(dot, names[0], laid.dot, laid.states[0], laid.sizes[0], sheet.direction)]
-    for (edge, _), box, link, at, line in zip(
-        edges, boxes, links, laid.labels, laid.lines, strict=True
-    ):
-        guard = edge_id(element, "guard", edge)
-        name = edge_id(element, "edge", edge)
-        look, marked = edge_look(sheet, number, edge), edge.name in sheet.marked
-        nodes.append(Node(guard, "guard marked" if marked else "guard", at, box))
-        ends = names[link.source], names[link.target]
-        lines.append(DrawnLine(name, ends, tuple(line), True, look))
-    return Drawing(laid.width, laid.height, tuple(nodes), tuple(lines))
 
 
 def edge_look(sheet: ChartSheet, number: int, edge: Transition) -> dict[str, str]:

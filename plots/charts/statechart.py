@@ -35,7 +35,8 @@ from plots.charts.contents import (
     state_texts,
     written_edges,
 )
-from plots.charts.drawing import Drawing, graph_drawing
+from plots.charts.drawing import Drawing
+from plots.charts.graph import graph_drawing
 from plots.charts.labels import (
     DOT,
     LONGEST_LINE,
@@ -49,7 +50,6 @@ from plots.charts.labels import (
     wrapped,
 )
 from plots.charts.matrix import WIDEST, matrix_drawing
-from plots.charts.nested import nested_drawing
 from plots.charts.notation import NOTATIONS, ChartWriter
 from plots.output.drawings import DrawnGraph
 from plots.style import CHART_THEMES, SANS, ChartTheme
@@ -236,7 +236,8 @@ def layout(chart: Chart, *, direction: str = "TB") -> dict[str, tuple[float, flo
     2
     """
     _check_chart(chart)
-    drawing = graph_drawing(ChartSheet(chart, direction=direction, form="graph").fitted(), 0)
+    sheet = ChartSheet(chart, direction=direction, form="graph").fitted()
+    drawing = graph_drawing(sheet, 0, nested=False)
     places = [node.at for node in drawing.nodes if node.kind == "state"]
     return {state.name: at for state, at in zip(chart.states, places, strict=True)}
 
@@ -396,7 +397,7 @@ class ChartSheet:
         """Return an element as it is drawn."""
         if self.form == "matrix":
             return matrix_drawing(self, number)
-        return (nested_drawing if self.nested else graph_drawing)(self, number)
+        return graph_drawing(self, number, nested=self.nested)
 
     def _lines_of(self, edge: Transition) -> list[Row]:
         return replace(self, tally=None, names=False, numbered={}, was={}).guard_rows(edge, 1, 0)

@@ -174,8 +174,9 @@ class _Layers:
             for k, level in zip(here, levels, strict=True):
                 loops.append(_Loop(k, side, at + level / 2))
                 at += level
-            # The line of every loop ends within its own level.
-            height = max(height, sum(levels) + 2 * (CORNER + LOOP - PORT) * bool(here))
+            # The lines of all loops end at the state; their labels may be higher than it.
+            furthest = max((abs(each.below) for each in loops if each.side == side), default=0.0)
+            height = max(height, 2 * (furthest + CORNER + LOOP) * bool(here))
             tallest = max(tallest, sum(levels))
             if here:
                 room[side > 0] = LOOP_OUT + BESIDE + max(self.links[k].size[0] for k in here)

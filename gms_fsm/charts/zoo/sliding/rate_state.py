@@ -45,12 +45,12 @@ from gms_fsm.charts.parameters import Parameter
 from gms_fsm.charts.registry import Demonstration, Entry
 
 # dpsi/dt = dtheta/dt / theta. The logarithm of a square does not depend on the sign that abs(v)
-# keeps until the crossing of v = 0 is located; `tiny` keeps it finite at v = 0.
+# keeps until the crossing of v = 0 is located; 1e-300 keeps it finite at v = 0.
 THETA = {"theta": "D_c / V_0 * exp(psi)"}
-LETS = {"ageing": THETA, "slip": THETA | {"tiny": "1e-300"}}
+LETS = {"ageing": THETA, "slip": THETA}
 FLOWS = {
     "ageing": "1 / theta - abs(v) / D_c",
-    "slip": "-abs(v) / D_c * 0.5 * log((v * theta / D_c)**2 + tiny)",
+    "slip": "-abs(v) / D_c * 0.5 * log((v * theta / D_c)**2 + 1e-300)",
 }
 REFERENCES = {"ageing": "Dieterich (1979), regularized", "slip": "Ruina (1983), regularized"}
 

@@ -1,21 +1,21 @@
-"""Charts with composite states as drawings: boxes in boxes, each laid out as a chart of its own.
+"""One element as a graph: boxes, in boxes where states have states inside.
 
-An edge is drawn where the two states are that it leads between, or the boxes around them; from
-there a line goes on to a state inside. An edge of a composite state is drawn once, from its box.
+What is in a box is laid out as a chart of its own. An edge is drawn where the two states are that
+it leads between, or the boxes around them; from there a line goes on to a state inside. An edge of
+a composite state is drawn once, from its box.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import hypot
 from typing import TYPE_CHECKING
 
 from gms_fsm.charts.chart import Transition
-from gms_fsm.charts.nesting import Level
-from plots.charts.contents import written_edges
+from plots.charts.contents import edges_by_priority, written_edges
 from plots.charts.drawing import Drawing, DrawnLine, Node, default_line, edge_look
-from plots.charts.labels import edge_id, element_id, part_id
+from plots.charts.labels import Row, edge_id, element_id, part_id
 from plots.charts.layout.layers import CORNER, LayerEdge, Point, Size, layered, straight
 from plots.charts.layout.placed import placed, ring
 
@@ -52,19 +52,55 @@ class _Drawn:
             self.boxes[path] = _moved(at, corner), size
 
 
-def nested_drawing(sheet: ChartSheet, number: int) -> Drawing:
-    """Return an element as states in states."""
-    drawn = _inside(sheet, number, "")
+@dataclass(frozen=True)
+class _Outline:
+    """The states that are drawn, by path, and the edges between them."""
+
+    chains: Mapping[str, tuple[str, ...]]  # the states around each, the outermost first, and itself
+    inside: Mapping[str, Sequence[str]]  # what is in each composite state, and in the chart
+    rows: Callable[[str], list[Row]]  # the text in a box
+    edges: Sequence[tuple[int, Transition]]
+    places: Mapping[str, Point] | None = None  # chosen by hand
+
+
+def graph_drawing(sheet: ChartSheet, number: int, *, nested: bool) -> Drawing:
+    """Return an element as states in states, or as its innermost states alone."""
+    drawn = _inside(sheet, number, "", (_nested if nested else _flat)(sheet, number))
     return Drawing(drawn.width, drawn.height, tuple(drawn.nodes), tuple(drawn.lines))
 
 
-def _inside(sheet: ChartSheet, number: int, path: str) -> _Drawn:
+def _nested(sheet: ChartSheet, number: int) -> _Outline:
+    del number
+    nesting = sheet.chart.nesting
+    inside = {path: each.inside() for path, each in nesting.levels.items() if each.state.states}
+    return _Outline(
+        {path: each.chain for path, each in nesting.levels.items()},
+        {"": [state.name for state in nesting.states], **inside},
+        lambda path: sheet.level_rows(nesting.levels[path]),
+        [*written_edges(sheet.chart)],
+    )
+
+
+def _flat(sheet: ChartSheet, number: int) -> _Outline:
+    states = {state.name: state for state in sheet.chart.states}
+    return _Outline(
+        {name: (name,) for name in states},
+        {"": [*states]},
+        lambda name: sheet.state_rows(states[name], number),
+        [*edges_by_priority(sheet.chart)],
+        sheet.chart.layout or None,
+    )
+
+
+def _inside(sheet: ChartSheet, number: int, path: str, outline: _Outline) -> _Drawn:
     """Draw what is inside a composite state, or the whole chart."""
-    element, cells, levels = element_id(number), sheet.cells, sheet.chart.nesting.levels
-    depth = len(levels[path].chain) if path else 0
-    names = levels[path].inside() if path else [s.name for s in sheet.chart.nesting.states]
-    inner = {name: _inside(sheet, number, name) for name in names if levels[name].state.states}
-    heads = [cells.state(sheet.level_rows(levels[name]), name in sheet.marked) for name in names]
+    element, cells, chains = element_id(number), sheet.cells, outline.chains
+    depth, names = len(chains[path]) if path else 0, outline.inside[path]
+    inner = {
+        name: _inside(sheet, number, name, outline) for name in names if name in outline.inside
+    }
+    rows = {name: outline.rows(name) for name in names}
+    heads = [cells.state(rows[name], name in sheet.marked) for name in names]
     sizes = [
         (
             max(float(head.width), inner[name].width + 2 * PAD),
@@ -74,34 +110,32 @@ def _inside(sheet: ChartSheet, number: int, path: str) -> _Drawn:
         else (float(head.width), float(head.height))
         for name, head in zip(names, heads, strict=True)
     ]
-    edges = [each for each in written_edges(sheet.chart) if _scope(levels, each[1]) == path]
+    edges = [each for each in outline.edges if _scope(chains, each[1]) == path]
     labels = [
         cells.guard(sheet.guard_rows(edge, priority, number), edge.name in sheet.marked)
         for priority, edge in edges
     ]
     links = [
         LayerEdge(
-            names.index(levels[edge.source].chain[depth]),
-            names.index(levels[edge.target].chain[depth]),
+            names.index(chains[edge.source][depth]),
+            names.index(chains[edge.target][depth]),
             (label.width, label.height),
         )
         for (_, edge), label in zip(edges, labels, strict=True)
     ]
-    centres = ring(sizes, links)
+    centres = [outline.places[name] for name in names] if outline.places else ring(sizes, links)
     laid = (
         layered(sizes, links, sheet.direction)
         if centres is None
         else placed(sizes, links, centres, sheet.direction)
     )
-    ids = {name: part_id(element, "state", name) for name in levels}
+    ids = {name: part_id(element, "state", name) for name in chains}
     start = f"{part_id(element, 'state', path)}-default" if path else f"{element}-default"
     drawn = _Drawn(laid.width, laid.height, [Node(start, "default", laid.dot)])
     for name, head, at, size in zip(names, heads, laid.states, laid.sizes, strict=True):
         marked = name in sheet.marked
         kind = "state composite" if name in inner else "state"
-        label = cells.state(
-            sheet.level_rows(levels[name]), marked, size, inside=inner.get(name) is not None
-        )
+        label = cells.state(rows[name], marked, size, inside=name in inner)
         drawn.boxes[name] = at, size
         drawn.nodes.append(Node(ids[name], f"{kind} marked" if marked else kind, at, label))
         if name in inner:
@@ -118,8 +152,8 @@ def _inside(sheet: ChartSheet, number: int, path: str) -> _Drawn:
         points = list(line)
         for end, place in ((edge.target, -1), (edge.source, 0)):
             if end not in names:
-                own = levels[end].chain[depth]
-                blocks = _blocks(drawn, [ids[each] for each in levels[end].chain])
+                own = chains[end][depth]
+                blocks = _blocks(drawn, [ids[each] for each in chains[end]])
                 below = float(heads[names.index(own)].height)
                 lane = LANES[drawn.inward.get(own, 0) % len(LANES)]
                 drawn.inward[own] = drawn.inward.get(own, 0) + 1
@@ -152,10 +186,10 @@ def _blocks(drawn: _Drawn, around: list[str]) -> list[Box]:
     ]
 
 
-def _scope(levels: dict[str, Level], edge: Transition) -> str:
+def _scope(chains: Mapping[str, tuple[str, ...]], edge: Transition) -> str:
     """Return the innermost state around both ends of an edge, or an empty text."""
-    around = levels[edge.target].chain[:-1]
-    return next((each for each in reversed(levels[edge.source].chain[:-1]) if each in around), "")
+    around = chains[edge.target][:-1]
+    return next((each for each in reversed(chains[edge.source][:-1]) if each in around), "")
 
 
 def _onward(point: Point, box: Box, outer: _Outer, blocks: list[Box]) -> list[Point]:
