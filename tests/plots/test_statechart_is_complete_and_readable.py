@@ -19,7 +19,7 @@ import gms_fsm.charts.chart
 from gms_fsm.charts import CHARTS, GMS_ELEMENT, LUGRE
 from gms_fsm.charts.chart import Chart, State, Transition
 from plots.charts.cells import SIDE
-from plots.charts.drawing import graph_drawing
+from plots.charts.graph import graph_drawing
 from plots.charts.labels import edge_id, part_id
 from plots.charts.layout.layers import BESIDE
 from plots.charts.statechart import ChartSheet, layout, statechart
@@ -264,7 +264,9 @@ def test_states_are_where_the_layout_of_the_chart_says() -> None:
             assert found[state] == pytest.approx((x + left, y + top), abs=1.0)
     live = ChartSheet(MOVED, live=True).fitted()
     assert live.form == "graph"
-    assert graph_drawing(live, 0).nodes[1].at[0] < graph_drawing(live, 0).nodes[2].at[0] - 300
+    nodes = {n.name: n for n in graph_drawing(live, 0, nested=False).nodes if "state" in n.kind}
+    first, second, *_ = nodes.values()
+    assert first.at[0] < second.at[0] - 300
 
 
 def test_the_layout_of_a_picture_is_a_layout_to_begin_with() -> None:
