@@ -1,4 +1,10 @@
-"""Values in engineering units, one unit for each quantity and place (``-776.2 mm``); factors."""
+"""Values in engineering units, one unit for each quantity and place (``-776.2 mm``); factors.
+
+Weighed against pint 0.25: importing it and making its registry took 4 to 6 s where this module
+takes 0.4 s, for five packages. It would replace the tables of factors and of base units, not what
+writes a value at a place. And it reads Nm, as everyone writes it, as numbers times metres, and
+refuses Ns/m: it would need a table of these names beside its own.
+"""
 
 from __future__ import annotations
 

@@ -140,8 +140,6 @@ class BenchMotion:
         Angular frequency, rad/s.
     spring, damper : float
         Between drive and slider, N/m and Ns/m.
-    rest : float
-        For how long the slider rests before time 0, s.
     """
 
     force: Ramps = FLAT
@@ -153,7 +151,6 @@ class BenchMotion:
     omega: float = 0.0
     spring: float = 0.0
     damper: float = 0.0
-    rest: float = 0.0
 
 
 def fastest_engine() -> str:
@@ -194,7 +191,6 @@ def run(
     options: dict[str, Any] = {} if t_eval is None else {"t_eval": np.asarray(t_eval)}
     if motion.omega > 0.0:  # a locked slider has no motion from which steps could be chosen
         options["max_step"] = 2 * math.pi / motion.omega / POINTS
-    options["t_start"] = -motion.rest
     # The slider's own scales: a chart such as modelica has none for a v that has just left 0.
     scales = {"x": bench.rtol * bench.bristle, "v": bench.rtol * bench.v_s}
     options |= {"rtol": bench.rtol, "atol": scales}

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 MEAN, SWING = 1.5, 1.0  # in v_s
 OMEGAS = (1.0, 10.0, 25.0)  # rad/s
 SETTLED = 1.0  # s
-# s before sliding, as some models have a friction that grows with the time at rest. It ends at
-# t = 0, where times are finest: a rest makes some equations stiff.
-REST = 10.0
+# s before sliding, as some models have a friction that grows with the time at rest. The drive then
+# creeps by 10 nm: at v = 0 itself rate-and-state friction is too stiff to be run.
+REST, CREEP = 10.0, 1e-6  # s, in v_s
 SPEEDS = (100.0, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.0, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01)  # in v_s
 TRAVEL, SHORTEST = 20.0, 0.5  # of each speed: F_s / sigma_0, and s
 PULLED = 40.0  # s
@@ -42,10 +42,11 @@ def _lag(specimen: Specimen) -> PhenomenonResult:
     widths, curves = [], []
     for omega in OMEGAS:
         period = 2 * math.pi / omega
-        end = period * (math.ceil(SETTLED / period) + 1)
+        end = period * (math.ceil((REST + SETTLED) / period) + 1)
         times = np.linspace(end - period, end, 401)  # from top speed to top speed
-        base = ((-REST, 0.0), (0.0, 0.0), (0.01, mean), (1.0, mean))
-        motion = _stiff(bench, velocity=base, swing=SWING / MEAN, omega=omega, rest=REST)
+        creep = CREEP * bench.v_s
+        base = ((0.0, creep), (REST, creep), (REST + 0.01, mean), (REST + 1.0, mean))
+        motion = _stiff(bench, velocity=base, swing=SWING / MEAN, omega=omega)
         trace = specimen.run(motion, end, times)
         slower, faster = slice(0, 201), slice(200, 401)
         down = float(np.interp(-mean, -trace.v[slower], trace.F[slower]))
@@ -71,14 +72,15 @@ def _lag(specimen: Specimen) -> PhenomenonResult:
 def _stribeck(specimen: Specimen) -> PhenomenonResult:
     bench = specimen.bench
     speeds = np.array(SPEEDS) * bench.v_s
-    corners: list[tuple[float, float]] = [(-REST, 0.0), (0.0, 0.0)]
-    ends, t = [], 0.0
+    creep = CREEP * bench.v_s
+    corners: list[tuple[float, float]] = [(0.0, creep), (REST, creep)]
+    ends, t = [], REST
     for speed in speeds.tolist():
         corners.append((t + 0.1 * SHORTEST, speed))
         t += 0.1 * SHORTEST + max(SHORTEST, TRAVEL * bench.bristle / speed)
         corners.append((t, speed))
         ends.append(t)
-    trace = specimen.run(_stiff(bench, velocity=corners, rest=REST), ends[-1], np.array(ends))
+    trace = specimen.run(_stiff(bench, velocity=corners), ends[-1], np.array(ends))
     v, F = trace.v[::-1], trace.F[::-1]
     lowest = int(F.argmin())
     fall = float(F[0] - F[lowest])
