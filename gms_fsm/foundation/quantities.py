@@ -217,18 +217,6 @@ _SPELLED = {"µ": "u", "μ": "u", "°": "deg", "N·m": "Nm", "N m": "Nm", "N*m":
 def of_rotation(unit: str) -> str:
     """Return the unit of a rotation that stands for one of a translation.
 
-    Parameters
-    ----------
-    unit : str
-        SI unit, for example ``"Ns/m"``.
-
-    Returns
-    -------
-    str
-        The same with torques and angles; one that has them already is as it was.
-
-    Examples
-    --------
     >>> [of_rotation(unit) for unit in ("m/s", "Ns/m", "m/N", "kg", "1", "s/rad")]
     ['rad/s', 'Nms/rad', 'rad/Nm', 'kg m^2', '1', 's/rad']
     """
@@ -238,18 +226,6 @@ def of_rotation(unit: str) -> str:
 def base_units(text: str) -> dict[str, int] | None:
     """Return the exponents of the SI base units in a unit; None if it is not known.
 
-    Parameters
-    ----------
-    text : str
-        Unit, for example ``"Ns/m"``.
-
-    Returns
-    -------
-    dict of str to int, or None
-        Without those that are 0.
-
-    Examples
-    --------
     >>> base_units("Ns/m")
     {'kg': 1, 's': -1}
     >>> base_units("m/s^2"), base_units("1"), base_units("furlong")

@@ -24,7 +24,9 @@ def texts(open_page: Open, path: Path) -> str:
     for tab in TABS:
         open_tab(page, tab)
         said.append(page.evaluate("document.body.innerText"))
-        said += page.evaluate("[...document.querySelectorAll('svg text')].map((e) => e.textContent)")
+        said += page.evaluate(
+            "[...document.querySelectorAll('svg text')].map((e) => e.textContent)"
+        )
     return "\n".join(said)
 
 
