@@ -185,3 +185,34 @@ def test_a_block_cannot_run_twice_at_once() -> None:
         pass
     assert mujoco.get_mjcb_passive() is None
     assert model.dof_frictionloss[1] == 0.7
+
+
+def test_inputs_are_those_of_the_data_as_straight_lines() -> None:
+    """A load that grows with time holds a slide that would slip without it."""
+    friction = Contact("pad", MODEL, inputs={"N": "load"})
+    model, data = pulled()
+    joints = JointFriction(
+        model, data, {"rail": friction}, inputs={"rail": lambda data: {"load": 1.0 + data.time}}
+    )
+    t, v = [0.0], [0.0]
+    with joints:
+        for _ in range(200):
+            mujoco.mj_step(model, data)
+            t.append(data.time)
+            v.append(data.qvel[0])
+        force, states = joints.forces["rail"], joints.states
+    alone = FrictionState(friction)
+    for step in range(200):
+        line = (1.0 + t[step], 1.0 + t[step + 1])
+        alone.advance_to(v[step], v[step + 1], t[step + 1], load=line)
+    assert states == {"rail": alone.states}
+    assert force == pytest.approx(alone.peek(v[-1], v[-1], 0.0, load=(1.2, 1.2)), rel=1e-2)
+
+
+def test_inputs_of_no_joint_and_no_values_are_refused() -> None:
+    friction = Contact("pad", MODEL, inputs={"N": "load"})
+    model, data = pulled()
+    with pytest.raises(ParameterError, match="there is no joint 'rial'"):
+        JointFriction(model, data, {"rail": friction}, inputs={"rial": lambda _: {}})
+    with pytest.raises(ParameterError, match="inputs=.joint: function of the data"):
+        JointFriction(model, data, {"rail": friction})
