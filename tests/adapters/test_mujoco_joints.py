@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import FrictionState
+from gms_fsm import Contact, FrictionState
 from gms_fsm.charts.registry import entry
 from gms_fsm.errors import ParameterError
 from gms_fsm.systems.models import demonstration
@@ -214,5 +214,5 @@ def test_inputs_of_no_joint_and_no_values_are_refused() -> None:
     model, data = pulled()
     with pytest.raises(ParameterError, match="there is no joint 'rial'"):
         JointFriction(model, data, {"rail": friction}, inputs={"rial": lambda _: {}})
-    with pytest.raises(ParameterError, match="inputs=.joint: function of the data"):
+    with pytest.raises(ParameterError, match=r"inputs=.joint: function of the data"):
         JointFriction(model, data, {"rail": friction})

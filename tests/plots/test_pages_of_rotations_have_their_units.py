@@ -1,4 +1,4 @@
-"""A replay page shows what turns in rad and Nm, in every tab, and what slides beside it in m and N."""
+"""A replay page shows in every tab what turns in rad and Nm, and what slides in m and N."""
 
 from __future__ import annotations
 
@@ -24,9 +24,7 @@ def texts(open_page: Open, path: Path) -> str:
     for tab in TABS:
         open_tab(page, tab)
         said.append(page.evaluate("document.body.innerText"))
-        said += page.evaluate(
-            "[...document.querySelectorAll('svg text')].map((e) => e.textContent)"
-        )
+        said += page.locator("svg text").all_text_contents()
     return "\n".join(said)
 
 
