@@ -425,11 +425,12 @@ def _record(work: Work, cls: Any, node: ast.Call) -> Value:
 
 def _own_call(work: Work, function: Callable[..., Any], arguments: list[Value]) -> Value | None:
     """Return a call of another function of the subset."""
-    done = work.translator.translated(function, arguments)
+    given_now, kinds = passed_of(arguments)
+    done = work.translator.translated(function, arguments, kinds)
     name, result, slots = done.function.name, done.result, done.slots
     if isinstance(result, RecordValue | ArrayValue):  # it may contain what is passed
-        arguments = [steady(work, each) for each in arguments]
-    passed = tuple(passed_of(arguments)[0])
+        given_now, _ = passed_of([steady(work, each) for each in arguments])
+    passed = tuple(given_now)
     if result is None:
         work.out.append(Do(Invoke("", name, passed)))
         return None

@@ -7,7 +7,6 @@ whose address follows from another's is not passed a second time.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 from integrators.machine_code.front_end.bindings import bind
@@ -17,10 +16,10 @@ from integrators.machine_code.front_end.values import (
     NumberValue,
     RecordValue,
     Value,
-    substituted,
+    with_locals,
 )
 from integrators.machine_code.front_end.work import Work
-from integrators.machine_code.tree import Const, Expr, Local, locals_in
+from integrators.machine_code.tree import Const, Expr, Local
 
 
 def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
@@ -28,13 +27,16 @@ def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
     passed: list[Expr] = []
     names: dict[Local, Expr] = {}
 
+    def numbered(local: Local) -> Expr:
+        """Return the parameter that stands for a local."""
+        if local not in names:
+            names[local] = Local(local.kind, f"a{len(passed)}", local.to)
+            passed.append(local)
+        return names[local]
+
     def known(expr: Expr) -> Expr:
         """Return an expression in terms of numbered parameters."""
-        for each in locals_in(expr):
-            if each not in names:
-                names[each] = Local(each.kind, f"a{len(passed)}", each.to)
-                passed.append(each)
-        return substituted(expr, names)  # type: ignore[no-any-return]
+        return with_locals(expr, numbered)  # type: ignore[no-any-return]
 
     def shape(value: Value, direct: bool) -> Any:
         match value:
@@ -72,11 +74,14 @@ def take(work: Work, arguments: Sequence[Value]) -> None:
         return local
 
     def own(expr: Expr, name: str) -> Expr:
-        for each in locals_in(expr):
-            if each not in known:
-                first = each.name.partition(".")[0] or name
-                known[each] = parameter(first if each.kind == "p" else name, each.kind, each.to)
-        return substituted(expr, known)  # type: ignore[no-any-return]
+        def given(local: Local) -> Expr:
+            if local not in known:
+                first = local.name.partition(".")[0] or name
+                kept = first if local.kind == "p" else name
+                known[local] = parameter(kept, local.kind, local.to)
+            return known[local]
+
+        return with_locals(expr, given)  # type: ignore[no-any-return]
 
     def bound(value: Value, name: str, direct: bool) -> Value:
         match value:
@@ -87,12 +92,12 @@ def take(work: Work, arguments: Sequence[Value]) -> None:
             case ArrayValue(kind=kind, dims=dims) if direct:
                 local = parameter(name, "p", kind)
                 return ArrayValue(kind, tuple(own(each, name) for each in dims), local)
-            case ArrayValue(dims=dims, base=base, index=index):
-                lengths = tuple(own(each, name) for each in dims)
+            case ArrayValue(kind, dims, base, offset, index, its_name, empty):
+                lengths = tuple([own(each, name) for each in dims])
                 at = None if index is None else own(index, name)
-                return replace(value, dims=lengths, base=own(base, name), index=at)
-            case RecordValue(fields=fields):
-                return replace(value, fields={k: bound(v, k, False) for k, v in fields.items()})
+                return ArrayValue(kind, lengths, own(base, name), offset, at, its_name, empty)
+            case RecordValue(cls=cls, fields=fields):
+                return RecordValue(cls, {k: bound(v, k, False) for k, v in fields.items()})
         return value
 
     values = [bound(each, name, True) for name, each in zip(names, arguments, strict=True)]

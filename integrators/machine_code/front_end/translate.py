@@ -109,13 +109,14 @@ class Translator:
             If a line is not part of the subset.
         """
         self._names.add(name)
-        done = self.translated(function, arguments)
+        passed, types = passed_of(arguments)
+        done = self.translated(function, arguments, types)
         parameters: dict[Local, None] = {}
         for argument in arguments:
             for expr in _expressions(argument):
                 parameters.update(dict.fromkeys(locals_in(expr)))
         kind = done.slots[0].kind if isinstance(done.result, NumberValue) else ""
-        call = Invoke(kind, done.function.name, tuple(passed_of(arguments)[0]))
+        call = Invoke(kind, done.function.name, tuple(passed))
         made: tuple[Statement, ...] = (Return((call,)),) if kind else (Do(call), Return(()))
         entry = TypedFunction(name, tuple(parameters), kind, (), made, entry=True)
         self.module.functions.append(entry)
@@ -151,7 +152,12 @@ class Translator:
         self.module.functions.append(made)
         return made
 
-    def translated(self, function: Callable[..., Any], arguments: Sequence[Value]) -> Specialised:
+    def translated(
+        self,
+        function: Callable[..., Any],
+        arguments: Sequence[Value],
+        types: tuple[Any, ...] | None = None,
+    ) -> Specialised:
         """Return a function specialised for the types of its arguments.
 
         Parameters
@@ -160,13 +166,15 @@ class Translator:
             A Python function of the subset.
         arguments : sequence of Value
             In terms of the caller's locals.
+        types : tuple, optional
+            What `passed_of` returns of them.
 
         Returns
         -------
         Specialised
             The same one for arguments of the same types.
         """
-        key = id(function), passed_of(arguments)[1]
+        key = id(function), passed_of(arguments)[1] if types is None else types
         if key not in self._done:
             self._kept.append((function, arguments))
             self._done[key] = self._specialised(function, arguments)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -171,27 +171,34 @@ def substituted(part: Any, given: Mapping[Local, Expr]) -> Any:
     >>> substituted(Op("i", "+", (n, n)), {n: Const("i", 5)}).operands[1].value
     5
     """
-    if not given:
-        return part
+    return with_locals(part, lambda local: given.get(local, local)) if given else part
+
+
+def with_locals(part: Any, give: Callable[[Local], Expr]) -> Any:
+    """Return a value, or an expression in one, with what is given for its locals, in their order.
+
+    Not with `replace`, which takes most of the time of a translation.
+    """
     match part:
         case Local():
-            return given.get(part, part)
-        case Op(operands=parts):
-            return replace(part, operands=tuple(substituted(each, given) for each in parts))
-        case Load(address=address) | AddressOf(address=address):
-            return replace(part, address=substituted(address, given))
-        case Address(base=base, index=index) | ArrayValue(base=base, index=index):
-            index = None if index is None else substituted(index, given)
-            moved = replace(part, base=substituted(base, given), index=index)
-            if isinstance(moved, ArrayValue):
-                dims = tuple(substituted(each, given) for each in moved.dims)
-                return replace(moved, dims=dims)
-            return moved
-        case NumberValue(expr=inner):
-            return NumberValue(substituted(inner, given))
-        case RecordValue(fields=fields):
-            changed = {name: substituted(each, given) for name, each in fields.items()}
-            return replace(part, fields=changed)
-        case Const() | Global() | FixedValue():
+            return give(part)
+        case Const() | Global() | FixedValue() | None:
             return part
+        case Load(kind=kind, address=at):
+            return Load(kind, with_locals(at, give))
+        case AddressOf(address=at, kind=kind, to=to):
+            return AddressOf(with_locals(at, give), kind, to)
+        case Address(base, offset, index, size, name, empty):
+            moved, at = with_locals(base, give), with_locals(index, give)
+            return Address(moved, offset, at, size, name, empty)
+        case Op(kind=kind, op=op, operands=parts):
+            return Op(kind, op, tuple([with_locals(each, give) for each in parts]))
+        case NumberValue(expr=inner):
+            return NumberValue(with_locals(inner, give))
+        case ArrayValue(kind, dims, base, offset, index, name, empty):
+            lengths = tuple([with_locals(each, give) for each in dims])
+            moved, at = with_locals(base, give), with_locals(index, give)
+            return ArrayValue(kind, lengths, moved, offset, at, name, empty)
+        case RecordValue(cls=cls, fields=fields):
+            return RecordValue(cls, {k: with_locals(each, give) for k, each in fields.items()})
     raise AssertionError(part)  # anything else would have been assigned to a local before

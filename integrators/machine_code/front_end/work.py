@@ -74,7 +74,9 @@ class Translating(Protocol):
 
     module: Module
 
-    def translated(self, function: Callable[..., Any], arguments: Sequence[Value]) -> Specialised:
+    def translated(
+        self, function: Callable[..., Any], arguments: Sequence[Value], types: tuple[Any, ...]
+    ) -> Specialised:
         """Return a function for some arguments."""
 
     def table(self, values: tuple[Any, ...]) -> ArrayValue:
