@@ -34,8 +34,9 @@ from integrators.machine_code.javascript import javascript_text, tables_of
 from integrators.machine_code.layout import OuterArray
 from integrators.machine_code.placed import placed
 from integrators.machine_code.tree import Const, Local
-from integrators.runners.compiled import INLINE, RecordArguments
+from integrators.runners.compiled import RecordArguments
 from integrators.runners.observing import value_rows
+from integrators.runners.tuning import INLINE
 
 PLACES = {
     "time_scale": "buffers.plan.control.time_scale",

@@ -9,12 +9,11 @@ from __future__ import annotations
 import ctypes
 import functools
 import hashlib
-import math
 import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import CodeType, FunctionType
 from typing import Any, NamedTuple, Protocol
 
@@ -24,6 +23,7 @@ from integrators import advance, crossings, elementary, loop, sliding, step_size
 from integrators.loop import Buffers, Machines
 from integrators.machine_code import layout as layouts
 from integrators.machine_code import llvm, objects, records, tree, whole_numbers
+from integrators.machine_code.calls import CompiledFunction
 from integrators.machine_code.front_end import (
     bindings,
     expressions,
@@ -36,19 +36,19 @@ from integrators.machine_code.front_end import (
 )
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
-from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray, parts_of
+from integrators.machine_code.layout import BlockLayout, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.tree import Local, OuterEntry
 from integrators.runners import columns, observing, repeating, stepping, varying
 from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
 from integrators.runners.stepping import Sample
+from integrators.runners.tuning import HOT, INLINE
 from integrators.sliding import Functions, Held, Sliding
 from integrators.steps import Coefficients
 from integrators.switching import jolts, sliding_bounds
 
 __all__ = [
-    "INLINE",
     "CodeStore",
     "CompiledFunction",
     "CompiledStepper",
@@ -70,32 +70,9 @@ LOOPS = (
     elementary, whole_numbers, steps, step_size, crossings, advance, sliding, sliding_bounds, jolts,
     loop, columns, stepping, observing, repeating, varying,
 )  # fmt: skip
+_compiling = threading.RLock()  # runs may be in several threads
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8
-
-# Functions that run once per arc, once per event, or never in most runs, and one that is long. Not
-# putting them inline saves a third of the compilation and costs nothing; with those of the bracket
-# it does.
-NOT_INLINE = [
-    "arm", "normal", "observe", "switch", "tick", "_solve", "slope_on", "seize", "look",
-    "scaled_size", "starting_step", "retry_factor", "next_on_grid", "raise_floor", "longest_next",
-    "_search", "_put_wanted", "_put_firing", "_put_stop", "_begin_arc", "_choose_stop", "_fired",
-    "_finish", "_held", "_jump", "_list", "_make_due", "_no_progress", "_often_changed",
-    "_only_due", "only_let_go", "_pick", "jolted", "arrived", "jolts", "_act", "_refuse", "_count",
-    "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
-    "advance", "_begin", "_impulse", "step_to",
-    "arm_on", "drop", "entangled", "let_go", "look_back", "look_held", "release", "_ask", "_bears",
-    "_combine", "crossed", "_is_far", "leave", "let_go_in_time", "_values",
-]  # fmt: skip
-# A step calls these seven times. Inline, the slopes stay in registers: a tenth of the time.
-INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", "flow_on"), True)
-
-
-# Every step calls these.
-HOT = {
-    "advance", "first_change", "_bracket", "interpolate", "margins", "observe_rows", "_probe",
-    "_search", "switch", "weighted_sum",
-}  # fmt: skip
 
 
 class RecordArguments(NamedTuple):
@@ -243,88 +220,6 @@ def _is_table(value: Any) -> bool:
 
 
 # --------------------------------------------------------------------------- engines
-@dataclass(eq=False)
-class _Call:
-    """A call of machine code, and the first error in a function that it calls."""
-
-    block: MemoryBlock
-    error: BaseException | None = None
-    copy: list[Any] = field(default_factory=list)  # the block's contents then
-
-
-@dataclass(eq=False)
-class CompiledFunction:
-    """Machine code with the layout of its arguments.
-
-    Parameters
-    ----------
-    layout : BlockLayout
-        Of the block.
-    library : Library
-        Contains `entry`.
-    calls : sequence of callable
-        The functions of the host program that it calls.
-    extra : int
-        Number of integers that are passed besides the block.
-    more : callable, optional
-        Returns an object with further functions on the same block, which may call `entry`.
-    """
-
-    layout: BlockLayout
-    library: Library
-    calls: Sequence[Callable[[float], float]]
-    extra: int
-    more: Callable[[], bytes] | None = None
-    _function: Any = field(init=False)
-    _now: threading.local = field(default_factory=threading.local)  # `call`: of each thread
-
-    def __post_init__(self) -> None:
-        integers = [ctypes.c_int64] * self.extra
-        kind = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, *integers)
-        self._function = kind(self.library.address("entry"))
-        table = self.library.variable("callbacks") if self.calls else 0
-        if table:
-            thunk = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
-            self._thunks = [thunk(self._guarded(call)) for call in self.calls]
-            places = (ctypes.c_void_p * len(self.calls)).from_address(table)
-            for k, each in enumerate(self._thunks):
-                places[k] = ctypes.cast(each, ctypes.c_void_p).value
-
-    @functools.cached_property
-    def extended(self) -> Library:
-        """Return the machine code with the further functions, made when they are wanted first."""
-        if self.more is not None:
-            self.library.add(self.more())
-        return self.library
-
-    def _guarded(self, call: Callable[[float], float]) -> Callable[[float], float]:
-        """Return a function that never raises: machine code could not pass it on."""
-        now = self._now
-
-        def value(t: float) -> float:
-            try:
-                if now.call.error is None:
-                    return float(call(t))
-            except BaseException as error:
-                now.call.error, now.call.copy = error, now.call.block.copy()
-            return math.nan
-
-        return value
-
-    def __call__(self, block: MemoryBlock, *integers: int) -> int:
-        """Call the machine code; this releases the GIL."""
-        now = self._now
-        outer, now.call = getattr(now, "call", None), _Call(block)
-        try:
-            result: int = self._function(block.address, *integers)
-            if now.call.error is not None:
-                block.restore(now.call.copy)
-                raise now.call.error
-        finally:
-            now.call = outer
-        return result
-
-
 def is_known(part: Any) -> bool:
     """Return whether a part of some arguments takes no room in a block.
 
@@ -351,21 +246,19 @@ def _made(
 ) -> CompiledFunction:
     """Return an engine from the store, or compile it; it calls the first entry."""
     layout = BlockLayout(arguments, is_known, inside=_longest(arguments) <= LONGEST_INSIDE)
-    content = _object(text, arguments, layout, entries, store, notify)
-    return CompiledFunction(layout, Library(content), calls, len(entries[0].extra))
+    name = _name(text, arguments, layout, entries)
+
+    def code(at_once: bool) -> tuple[bytes, bool]:
+        if at_once and (store is None or store.get(name) is None):
+            quick = f"{name}-at-once"
+            return _object(quick, layout, entries, store, notify, at_once=True), True
+        return _object(name, layout, entries, store, notify), False
+
+    return CompiledFunction(layout, code, calls, len(entries[0].extra))
 
 
-def _object(
-    text: str,
-    arguments: Any,
-    layout: BlockLayout,
-    entries: Sequence[EntryPoint],
-    store: CodeStore | None,
-    notify: Callable[[str], None],
-    *,
-    each: bool = False,
-) -> bytes:
-    """Return machine code from the store, or compile it."""
+def _name(text: str, arguments: Any, layout: BlockLayout, entries: Sequence[EntryPoint]) -> str:
+    """Return the name of machine code: a hash of everything that it depends on."""
     # Which of the functions in the text are called, and the coefficients.
     fixed = [
         getattr(part, "__name__", part) for part in parts_of(arguments, is_known) if is_known(part)
@@ -373,14 +266,30 @@ def _object(
     named = [(name, function.__name__, *rest) for name, function, *rest in entries]
     what = edition(), named, text, layout.key(), fixed, target_name()
     called = entries[0].function.__name__
-    name = f"{called}-{hashlib.sha256(repr(what).encode()).hexdigest()[:24]}"
-    content = None if store is None else store.get(name)
-    if content is None:
+    return f"{called}-{hashlib.sha256(repr(what).encode()).hexdigest()[:24]}"
+
+
+def _object(
+    name: str,
+    layout: BlockLayout,
+    entries: Sequence[EntryPoint],
+    store: CodeStore | None,
+    notify: Callable[[str], None],
+    *,
+    each: bool = False,
+    at_once: bool = False,
+) -> bytes:
+    """Return machine code from the store, or compile it."""
+    with _compiling:
+        content = None if store is None else store.get(name)
+        if content is not None:
+            return content
         started = time.perf_counter()
         notify("compiling, once for each chart and method ...")
         translator = translated(layout, entries, each=each)
         hot = {name for name, own in translator.origins.items() if own in HOT}
-        content = objects.compiled(llvm_text(translator.module), hot)
+        made = llvm_text(translator.module)
+        content = objects.compiled_at_once(made) if at_once else objects.compiled(made, hot)
         if store is not None:
             store.put(name, content)
         notify(f"compiled in {time.perf_counter() - started:.1f} s")
@@ -458,9 +367,12 @@ def engine(
     record = EntryPoint("entry", columns.record, RECORD, ("steps", "pause"))
     made = _made(text, arguments, [record], calls, store, notify)
     if more:
-        made.more = lambda: _object(
-            f"{text} {text_of_more()}", arguments, made.layout, more, store, notify
-        )
+
+        def further() -> bytes:
+            name = _name(f"{text} {text_of_more()}", arguments, made.layout, more)
+            return _object(name, made.layout, more, store, notify)
+
+        made.more = further
     return made
 
 
@@ -506,9 +418,10 @@ def stepper(
         blocks, one after the other in memory, and returns the sum of what it returns.
     """
     layout = BlockLayout(arguments, is_known)
-    entry = EntryPoint("entry", stepping.step_to)
+    entries = [EntryPoint("entry", stepping.step_to)]
+    name = _name(text, arguments, layout, entries)
     return CompiledStepper(
-        layout, Library(_object(text, arguments, layout, [entry], store, notify, each=True))
+        layout, Library(_object(name, layout, entries, store, notify, each=True))
     )
 
 

@@ -30,7 +30,7 @@ from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.tree import Const, Local
 from integrators.runners import columns, stepping
-from integrators.runners.compiled import INLINE
+from integrators.runners.tuning import INLINE
 from integrators.step_size import retry_factor
 from integrators.switching import sliding_bounds
 from tests.soak.platforms import CLibrary

@@ -42,9 +42,10 @@ from integrators.machine_code.javascript import javascript_text, script_number, 
 from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.tree import Local
 from integrators.runners import columns
-from integrators.runners.compiled import INLINE, RECORD, RecordArguments, is_known
+from integrators.runners.compiled import RECORD, RecordArguments, is_known
 from integrators.runners.observing import observe_rows
 from integrators.runners.stepping import FULL_LOG
+from integrators.runners.tuning import INLINE
 
 GROWING = {
     "buffers.out.rows_t": "rows_t",
