@@ -23,13 +23,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import ChartModel, Prescribed, simulate
+from gms_fsm import ChartModel, Prescribed, prepare, simulate
 from gms_fsm.foundation.store import CodeFolder
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.program import lower
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording import compiled_run
 from integrators import elementary, loop, step_size
+from integrators.machine_code import calls
 from integrators.machine_code.front_end import statements
 from integrators.machine_code.layout import BlockLayout
 from integrators.runners import columns
@@ -362,6 +363,45 @@ def test_a_digest_depends_on_code_and_constants_but_not_on_the_file() -> None:
     digests = {machine.digest(u) for u in (one, *others)}
     assert len(digests) == 1 + len(others)
     assert machine.digest(same) == machine.digest(one) != machine.digest(one, text="more")
+
+
+# --------------------------------------------------------------------------- at once, and better
+def test_what_was_compiled_at_once_is_replaced_where_it_takes_time_and_has_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiled, "store", lambda: CodeFolder.at(tmp_path))
+    monkeypatch.setattr(compiled_run, "_known", {})
+
+    def kinds() -> list[bool]:
+        return sorted(path.name.endswith("-at-once") for path in _kept(tmp_path))
+
+    def run() -> bytes:
+        trace = simulate(stick_slip("signed"), OPEN_LOOP, 31.0, engine="compiled")
+        return trace.rows.y.tobytes() + trace.transitions.tobytes()
+
+    first = run()
+    assert kinds() == [True]
+    monkeypatch.setattr(calls, "AT_ONCE", 0.0)
+    assert run() == first
+    assert kinds() == [False, True]
+    monkeypatch.setattr(compiled_run, "_known", {})
+    path = next(each for each in _kept(tmp_path) if each.name.endswith("-at-once"))
+    path.unlink()
+    assert run() == first
+    assert kinds() == [False], "the better one is what is loaded"
+
+
+def test_what_repeats_a_run_is_compiled_when_a_run_is_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiled, "store", lambda: CodeFolder.at(tmp_path))
+    monkeypatch.setattr(compiled_run, "_known", {})
+    prepared = prepare(stick_slip("signed"), OPEN_LOOP, 31.0)
+    assert not _kept(tmp_path)
+    end = prepared.end()
+    assert sorted(path.name.partition("-")[0] for path in _kept(tmp_path)) == ["adapt", "record"]
+    trace = simulate(stick_slip("signed"), OPEN_LOOP, 31.0, engine="machines")
+    assert end.y == tuple(trace.rows.y[-1].tolist())
 
 
 # --------------------------------------------------------------------------- several threads
