@@ -27,7 +27,7 @@ from integrators.machine_code.front_end.values import (
     RecordValue,
     Value,
 )
-from integrators.machine_code.front_end.work import Work, as_kind
+from integrators.machine_code.front_end.work import Work, as_kind, assigned_in
 from integrators.machine_code.tree import (
     Assign,
     Break,
@@ -143,11 +143,7 @@ def _while(work: Work, test: ast.expr, inside: Sequence[ast.stmt]) -> None:
 
 
 def _for(work: Work, name: str, over: ast.expr, inside: list[ast.stmt]) -> None:
-    if any(
-        isinstance(each, ast.Name) and each.id == name and isinstance(each.ctx, ast.Store)
-        for part in inside
-        for each in ast.walk(part)
-    ):
+    if any(name in assigned_in(part) for part in inside):
         raise work.error(f"the loop changes its own variable {name}")
     if isinstance(over, ast.Call) and value(work, over.func) == FixedValue(range):
         _over_range(work, name, over, inside)

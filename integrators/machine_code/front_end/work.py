@@ -117,7 +117,7 @@ class Work:
     def count_assignments(self, *nodes: ast.AST) -> None:
         """Count assignments to names."""
         for node in nodes:
-            for name in _assigned_in(node):
+            for name in assigned_in(node):
                 self.assigned[name] = self.assigned.get(name, 0) + 1
 
     def error(self, reason: str) -> TranslationError:
@@ -169,7 +169,7 @@ class Work:
 
 
 @functools.lru_cache(maxsize=1024)
-def _assigned_in(node: ast.AST) -> tuple[str, ...]:
+def assigned_in(node: ast.AST) -> tuple[str, ...]:
     """Return the names that a part of a text assigns, as often as it does."""
     names = (each for each in ast.walk(node) if isinstance(each, ast.Name))
     return tuple(each.id for each in names if isinstance(each.ctx, ast.Store))
