@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
-from gms_fsm.coupling.memory import fast
 from gms_fsm.coupling.steppable import alone
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing, unknown
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import simulate
+from gms_fsm.run.stepped.memory import fast
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Body, Contact, System
 
