@@ -41,7 +41,7 @@ from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.foundation.files import write_whole
 from plots import figures, panels
-from plots.style import INK, LINE_GREY, RC, TEXT_GREY, ramp
+from plots.style import INK, LINE_GREY, RC, TEXT_GREY, compared_look, ramp
 from plots.systems.mechanism import schematic_figure
 
 FOLDER = Path(__file__).parent / "images"
@@ -307,6 +307,7 @@ def draw_howto() -> None:
     figures.save(desk_figure(), FOLDER / "howto_desk_experiment.png")
     figures.save(mujoco_figure(), FOLDER / "howto_mujoco.png")
     figures.save(names_of("fit.md")["figure"], FOLDER / "howto_fit.png")
+    figures.save(compensation_figure(), FOLDER / "howto_compensation.png")
 
 
 def tutorial_chart() -> Chart:
@@ -334,6 +335,26 @@ def names_of(page: str) -> dict[str, Any]:
             if kind == "code":
                 exec(code, names)
     return names
+
+
+def compensation_figure() -> Figure:
+    """Draw a motion of docs/howto/compensation.md, and the errors along it."""
+    names = names_of("compensation.md")
+    x, t = names["motions"]["inner loops"], names["t"]
+    with rc_context(RC):
+        figure = Figure(figsize=(7.2, 4.2), layout="constrained")
+        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
+        top.plot(t, 1e3 * x, color=INK)
+        top.set_ylabel("reference [mm]")
+        looks = {"none": 3, "Coulomb": 1, "LuGre": 4, "GMS": 0}
+        for name, look in looks.items():
+            model = names["models"][name]
+            compensator = None if model is None else names["Compensator"](model, names["tick"])
+            error = (names["follow"](x, compensator) - x[1:-1]) / names["count"]
+            bottom.plot(t[1:-1], error, **compared_look(look), label=name)
+        bottom.set(xlabel="$t$ [s]", ylabel="error [counts]", ylim=(-21, 27))
+        bottom.legend(ncols=4, loc="upper right")
+    return figure
 
 
 def mujoco_figure() -> Figure:
