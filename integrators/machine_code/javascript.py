@@ -143,9 +143,7 @@ class _Script(CWriter):
         function = self.function
         names = ", ".join(self.name(each.name) for each in function.parameters)
         lines = [f"function {self.functions(function.name)}({names}) {{"]
-        self.let_at = {
-            at: names - self.unread for at, names in declarations(function.body).items()
-        }
+        self.let_at = {at: names - self.unread for at, names in declarations(function.body).items()}
         later = {name for names in self.let_at.values() for name in names}
         own = [
             f"{self.name(each.name)} = {_ZEROS[each.kind]}"
