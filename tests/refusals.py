@@ -2464,27 +2464,31 @@ rows = {
     "input with a bad name": ("system 'open', input", ..., lambda: opened(inputs=("2u",))),
 }  # fmt: skip
 group("inputs of a system", ParameterError, lambda make: make(), rows)
-CALLED = {"period": 0.1, "outputs": ("u",)}
+AT_TICKS = {"period": 0.1, "outputs": ("u",)}
 
 
-def called(function: Any) -> System:
+def by_function(function: Any) -> System:
     """Return a system with a controller that is a Python function."""
-    return opened(inputs=(), sampled=(Sampled("pd", updates=function, **CALLED),))
+    return opened(inputs=(), sampled=(Sampled("pd", updates=function, **AT_TICKS),))
 
 
 rows = {
-    "stepped": ("sampled 'pd'", ..., lambda: SystemState(called(lambda x: x))),
+    "stepped": ("sampled 'pd'", ..., lambda: SystemState(by_function(lambda x: x))),
     "outputs without names": (
         "sampled 'pd': outputs", ..., lambda: Sampled("pd", period=0.1, updates=abs)),
     "names for texts": (
-        "sampled 'pd': outputs", ..., lambda: Sampled("pd", updates={"u": "1"}, **CALLED)),
-    "unknown value": ("sampled 'pd'", ..., lambda: simulate(called(lambda y: y), 1.0)),
-    "any values": ("sampled 'pd'", ..., lambda: simulate(called(lambda **all: 1.0), 1.0)),
+        "sampled 'pd': outputs", ..., lambda: Sampled("pd", updates={"u": "1"}, **AT_TICKS)),
+    "unknown value": ("sampled 'pd'", ..., lambda: simulate(by_function(lambda y: y), 1.0)),
+    "any values": ("sampled 'pd'", ..., lambda: simulate(by_function(lambda **all: 1.0), 1.0)),
 }  # fmt: skip
 group("controllers in Python", ParameterError, lambda make: make(), rows)
 rows = {
-    "it raises": ("sampled 'pd'", ..., lambda: simulate(called(lambda t: 1 / t), 1.0)),
-    "it returns a text": ("sampled 'pd'", ..., lambda: simulate(called(lambda t: "fast"), 1.0)),
+    "it raises": ("sampled 'pd'", ..., lambda: simulate(by_function(lambda t: 1 / t), 1.0)),
+    "it returns a text": (
+        "sampled 'pd'",
+        ...,
+        lambda: simulate(by_function(lambda t: "fast"), 1.0),
+    ),
 }
 group("a call of a controller", SignalError, lambda make: make(), rows)
 # --------------------------------------------------------------------------- sessions
