@@ -7,14 +7,43 @@ from importlib.metadata import version
 
 import numpy as np
 import pytest
+import rumoca
 from pymoca import parser
 
-from gms_fsm import Body, System, simulate
+from gms_fsm import Body, Prescribed, System, simulate
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.exporters.targets.modelica import modelica
-from tests.exporters.frictions import NAMES, case, loaded
+from tests.exporters.frictions import NAMES, case, loaded, scenario
 from tests.exporters.rumoca_runs import T_END, compared, ran_in_rumoca
 
+FLANGED = """
+connector Flange_a
+  Real {s};
+  flow Real {f};
+end Flange_a;
+connector Flange_b
+  Real {s};
+  flow Real {f};
+end Flange_b;
+model Mover
+  Flange_a flange;
+  input Real u;
+equation
+  flange.{s} = u;
+end Mover;
+model Test
+  pad_{kind} pad;
+  Mover one;
+  Mover other;
+  Real x(start = 0, fixed = true);
+equation
+  der(x) = 1e-3 * sin(50 * time);
+  one.u = x;
+  other.u = 0;
+  connect(pad.flange_b, one.flange);
+  connect(pad.flange_a, other.flange);
+end Test;
+"""
 NEAR = 1e-6  # of the largest force; Rumoca locates events by the tolerance of its solver
 
 
@@ -57,3 +86,38 @@ def test_further_inputs_position_time_and_actions(ran: Callable[..., None]) -> N
         "a chart with x, t, a further input and actions",
         f"F at most {worst:.1g} of its largest value apart, over {len(trace.transitions)} switches",
     )
+
+
+@pytest.mark.parametrize("name", ["pulled_mass", "servo", "paper_fig3_non_drifting"])
+def test_whole_systems(name: str, ran: Callable[..., None]) -> None:
+    system, t_end = scenario(name), 0.05
+    text = modelica(Subject.of(system, "modelica", name=name))[f"{name}.mo"]
+    config = rumoca.SimConfig(solver="auto", rtol=1e-9, atol=1e-14)
+    model = rumoca.Session().loads(text, model=name)
+    result = model.simulate((0.0, t_end), dt=t_end / 50, config=config)
+    trace, body = simulate(system, t_end, rtol=1e-10), system.bodies[-1]
+    apart = abs(float(np.asarray(result[body.x])[-1]) - float(trace.body(body.name).x[-1]))
+    assert apart < 1e-9
+    told = f"Rumoca {version('rumoca')}"
+    what = f"{len(trace.transitions)} switches; {body.x} within {apart:.0e} m at the end"
+    ran("modelica", told, f"{name}, a whole system, 0.05 s", what)
+
+
+@pytest.mark.parametrize(
+    ("kind", "s", "f"), [("translational", "s", "f"), ("rotational", "phi", "tau")]
+)
+def test_between_flanges(kind: str, s: str, f: str, ran: Callable[..., None]) -> None:
+    """The connectors are like those of the Modelica Standard Library, which Rumoca lacks."""
+    contact, outer = scenario("servo").contact("bearing"), kind.capitalize()
+    files = modelica(Subject.of(contact, "modelica", name="pad"))
+    given = files["pad_flanges.mo"].partition("model pad_rotational")
+    own = given[0] if kind == "translational" else given[1] + given[2]
+    text = files["pad.mo"] + own.replace(f"Modelica.Mechanics.{outer}.Interfaces.", "")
+    text += FLANGED.format(kind=kind, s=s, f=f)
+    config = rumoca.SimConfig(solver="auto", rtol=1e-9, atol=1e-14)
+    result = rumoca.Session().loads(text, model="Test").simulate((0.0, 0.2), dt=1e-3, config=config)
+    exact = simulate(contact.model, Prescribed("1e-3*sin(50*t)"), 0.2, rtol=1e-10).F[-1]
+    ends = [float(np.asarray(result[f"pad.flange_{u}.{f}"])[-1]) for u in "ba"]
+    assert ends == pytest.approx([exact, -exact], rel=1e-6)
+    told = f"Rumoca {version('rumoca')}"
+    ran("modelica", told, f"GMS 4 between {kind} flanges (connectors of our own)", "F within 1e-6")
