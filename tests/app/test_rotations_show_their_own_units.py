@@ -125,6 +125,21 @@ def test_the_debugger_shows_units_of_rotations(name: str) -> None:
     assert only_of_rotations(said), units_in(said, MASS)
 
 
+@pytest.mark.slow
+def test_the_full_screen_debugger_shows_units_of_rotations() -> None:
+    pytest.importorskip("textual", reason="the full screen needs the extra 'debug'")
+    from tests.app.full_screen import LARGE, drive, press, screen_text, typed
+
+    shown = []
+
+    async def look(app: Any, pilot: Any) -> None:
+        await press(pilot, *typed("until t = 0.12"), "enter")
+        shown.append(screen_text(app))
+
+    drive(look, LARGE, Session(system_of("robot_joint"), 0.15))
+    assert only_of_rotations(shown[0]), units_in(shown[0], MASS)
+
+
 def test_numbers_in_conditions_have_units_of_rotations() -> None:
     session = Session(system_of("robot_joint"), 0.3)
     session.until("w_m > 60 rpm")
@@ -155,11 +170,11 @@ def test_pictures_of_rotations_have_units_of_rotations() -> None:
     from matplotlib.text import Text
 
     from plots import figures
-    from plots.systems.mechanism import draw_mechanism as mechanism
+    from plots.systems.mechanism import schematic
 
     trace = simulate(system_of("robot_joint"), 0.3).contact("bearings")
-    drawn = [figures.overview(trace), figures.phase(trace), figures.ribbons(trace)]
-    for figure in (*drawn, mechanism(system_of("servo"))):
+    drawn = [figures.overview(trace), figures.phase(trace), figures.cascade_figure(trace)]
+    for figure in (*drawn, schematic(system_of("servo"))):
         texts = "\n".join(each.get_text() for each in figure.findobj(Text))
         assert units_in(texts, MASS) == set()
         assert figure not in drawn or units_in(texts, TORQUE) >= {"Nm"}
