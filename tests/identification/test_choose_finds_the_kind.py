@@ -23,7 +23,7 @@ from gms_fsm.identification.candidates import (
     gms,
     stiffer_one_way,
 )
-from gms_fsm.identification.choose import period_of
+from gms_fsm.identification.folds import period_of
 from gms_fsm.systems.models import Model
 from tests.helpers import FASTEST
 from tests.identification.records import FREE, bank, noise, rubbed

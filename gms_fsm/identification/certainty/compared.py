@@ -156,7 +156,8 @@ def lines_of(fit: Any) -> list[str]:
         lines.append(f"chosen among {len(fit.choice.rows)} candidates: {fit.choice.chosen}")
         for row in fit.choice.rows:
             if row.name != fit.choice.chosen:
-                lines.append(f"{row.name}: {f'failed: {row.note}' if row.note else row.why}")
+                lost = f" failed: {row.note}" if row.note else f": {row.why}"
+                lines.append(f"{row.name}{lost}")
     return [*lines, fit.stopped] if fit.stopped else lines
 
 
