@@ -20,11 +20,17 @@ def directions_of(
     what: Mounted, program: Program, y: list[float], names: Iterable[str]
 ) -> Directions:
     """Return directions by the names of numbers, as in a sweep, and ``initial.v``."""
-    given = (names,) if isinstance(names, str) else tuple(names)
-    if not given:
+    try:
+        given = (names,) if isinstance(names, str) else tuple(names)
+        hash(given)
+    except TypeError:
         raise ParameterError(
-            "it names nothing", place="sensitivities", advice="give names of numbers"
-        )
+            "it must be names, for example ('F_s', 'initial.v')",
+            place="sensitivities",
+            value=names,
+        ) from None
+    if not given:
+        raise ParameterError("it names nothing", place="sensitivities", value=names)
     if len({*given}) < len(given):
         raise ParameterError("a name stands there twice", place="sensitivities", value=given)
     shared, own = program.plan.names.shared, program.plan.names.own

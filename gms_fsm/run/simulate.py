@@ -171,7 +171,8 @@ def simulate(
         raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")
     start = Problem.of(model, on, end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, start.what, start.output).values() if monitors else ()
-    if sensitivities:
+    asked = not isinstance(sensitivities, list | tuple) or len(sensitivities) > 0
+    if asked:
         check_derivable(chosen, until)
         wanted = directions_of(start.what, start.program, start.y, sensitivities)
     own = {} if machines is None else own_machines(machines, start)
@@ -204,7 +205,7 @@ def simulate(
     if keeper is not None:
         keeper.finish()
     trace = seen.trace()
-    if sensitivities:
+    if asked:
         trace = replace(trace, derived=derived(start, wanted, trace))
     return watched(trace, watching) if watching else trace
 

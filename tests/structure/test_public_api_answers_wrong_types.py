@@ -69,6 +69,7 @@ WRONG: tuple[Any, ...] = (None, object(), "x", -1, [], {}, math.nan, lambda: 0)
 PARAMETERS = GMSParameters([2.0], [0.1], [0.1], sigma_2=0.4, stribeck=Stribeck(1, 1.5, 0.1), v_c=1)
 MODEL = GMS(PARAMETERS, law="signed")
 RIG = Prescribed("0.2*sin(t)")
+SHAKEN = Prescribed("1e-4*sin(2*pi*t)")
 STATE = State("on", {"z": "v"})
 EDGE = Transition("go", "on", "on", guard="z > 1", actions={"z": "0"})
 CHART = Chart("one", ("v",), ("z",), ("k",), (STATE,), (EDGE,), {"F": "k * z"})
@@ -272,6 +273,7 @@ def _by_entry() -> dict[str, dict[str, Any]]:
         "fit": {"fixed": {"v_c": 1e-3}, "free": ["k"], "search": "local"},
         "handout": {"path": Path("a.pdf")},
         "initial_bank": {"n": 2, "v_c": None},
+        "limit_cycle": {"rig": SHAKEN, "near": simulate(MODEL, SHAKEN, 2.0), "period": 1.0},
         "live_statechart": {"row": 0},
         "measure_phenomena": {"models": ["stiction"], "phenomena": ["stick-slip"]},
         "play": {"t_end": 1.0, "vary": {"v_c": (1e-9, 2.0)}},
