@@ -38,8 +38,8 @@ from integrators.machine_code.layout import BlockLayout, MemoryBlock
 from integrators.machine_code.readable.c_records import CBlock, records_text
 from integrators.machine_code.readable.possible import BlockStart
 from integrators.machine_code.readable.simplified import simplified
+from integrators.machine_code.tuning import INLINE
 from integrators.runners.stepping import FULL_LOG
-from integrators.runners.tuning import INLINE
 
 FIELDS = ("t", "switches", "logged", "engine")  # of the struct
 # Numbers of the block that the functions beside the engine write.

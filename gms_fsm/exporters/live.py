@@ -27,16 +27,16 @@ from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import NUMBERS, numbers_of
 from gms_fsm.systems.reading.values import CURVE, MODEL, WEIGHT
 from integrators import loop
-from integrators.machine_code.compact import compact
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
-from integrators.machine_code.javascript import javascript_text, tables_of
 from integrators.machine_code.layout import OuterArray
-from integrators.machine_code.placed import placed
+from integrators.machine_code.script.compact import compact
+from integrators.machine_code.script.javascript import javascript_text, tables_of
+from integrators.machine_code.script.placed import placed
 from integrators.machine_code.tree import Const, Local
+from integrators.machine_code.tuning import INLINE
 from integrators.runners.compiled import RecordArguments
 from integrators.runners.observing import value_rows
-from integrators.runners.tuning import INLINE
 
 PLACES = {
     "time_scale": "buffers.plan.control.time_scale",

@@ -95,12 +95,12 @@ def _function(function: ast.FunctionDef, active: ActiveNumbers) -> ast.FunctionD
     filled = [arg.arg for arg in function.args.args if arg.arg in VECTORS[1:]]
     arguments = [MARK + name for name in ("t", "y", "p", *filled)]
     function.args.args += [ast.arg(name) for name in arguments]
-    writer = _Writer(active, function)
+    writer = _TangentWriter(active, function)
     function.body = writer.block(function.body)
     return function
 
 
-class _Writer:
+class _TangentWriter:
     """Writes the assignments of tangents of one function."""
 
     def __init__(self, active: ActiveNumbers, function: ast.FunctionDef) -> None:
@@ -185,7 +185,7 @@ class _NoNumber(Exception):
 class _Atoms(ast.NodeTransformer):
     """Replaces what the expression language does not know by names, with their tangents."""
 
-    def __init__(self, writer: _Writer) -> None:
+    def __init__(self, writer: _TangentWriter) -> None:
         self.writer = writer
         self.found: dict[str, tuple[str, str]] = {}  # name: text of its value, text of its tangent
 

@@ -88,11 +88,12 @@ def _terms(fit: Fit) -> str:
 # --------------------------------------------------------------------------- whole fits
 def save_whole(fit: Fit, path: Path) -> Path:
     """Write a fit with its records; `loaded` reads it back."""
-    task, own = fit.task, fit.task.subject.made_of
+    task, subject = fit.task, fit.task.subject
+    system = subject.given
     kind, table = (
-        ("system", SystemTable.of(own))
-        if isinstance(own, System)
-        else ("model", ModelTable.of(own))
+        ("model", ModelTable.of(subject.model))
+        if system is None
+        else ("system", SystemTable.of(system))
     )
     data = {
         "format": FORMAT,

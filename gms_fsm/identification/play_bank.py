@@ -93,7 +93,7 @@ class PlayBank:
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class Stretch:
     """The motion of one record in few rows, its force, and what each of its rows counts."""
 
     x: FloatArray
@@ -134,15 +134,15 @@ def play_bank(records: Sequence[Record], smoothing: float | None) -> PlayBank:
     return PlayBank(pairs[own, 0], pairs[own, 1], stiffness[own], v_s, float(shares[-3]))
 
 
-def _part(record: Record, smoothing: float | None, most: int) -> _Part:
+def _part(record: Record, smoothing: float | None, most: int) -> Stretch:
     motion, every = record.motion(smoothing), slice(None, None, max(1, len(record) // most))
     chosen = record.chosen[every]
     force = np.where(chosen, record.columns["force"][every], 0.0)
     weight = float(record.chosen.sum() / max(int(chosen.sum()), 1))
-    return _Part(motion.position[every], motion.velocity[every], force, chosen, weight)
+    return Stretch(motion.position[every], motion.velocity[every], force, chosen, weight)
 
 
-def _gram(part: _Part, pairs: FloatArray, v_s: float) -> FloatArray:
+def _gram(part: Stretch, pairs: FloatArray, v_s: float) -> FloatArray:
     """Return the inner products of all terms and the force over the rows of a record.
 
     The motion is passed twice: what was before is not known, and forgotten the second time.

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from numpy.typing import ArrayLike
 
@@ -17,9 +17,12 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.display import short_repr
 from gms_fsm.foundation.equality import by_value
-from gms_fsm.records.record import Record
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring
+
+if TYPE_CHECKING:
+    from gms_fsm.records.record import Record
+
 
 MASS = Parameter("mass", "kg", "> 0", per_element=False, meaning="mass")
 STIFFNESS = Parameter(
@@ -78,8 +81,9 @@ class Prescribed:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
 
     def __post_init__(self) -> None:
-        velocity, given = self.velocity, self.inputs
-        if isinstance(velocity, Record):
+        velocity: Any = self.velocity
+        given = self.inputs
+        if hasattr(velocity, "motion"):  # a record: no class of it, which takes SciPy to import
             motion = velocity.motion()
             given = {n: (motion.time, u) for n, u in velocity.inputs.items()} | dict(given)
             velocity = (motion.time, motion.velocity)

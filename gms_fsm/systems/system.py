@@ -158,12 +158,8 @@ class System:
             raise ParameterError("it must be a text", place="name", value=self.name)
         put, here = object.__setattr__, f"system {shown(self.name)}"
         kinds = {
-            "bodies": Body,
-            "springs": Spring,
-            "contacts": Contact,
-            "supervisors": Supervisor,
-            "sampled": Sampled,
-            "controllers": Sampled,
+            **{"bodies": Body, "springs": Spring, "contacts": Contact, "supervisors": Supervisor},
+            **{"sampled": Sampled, "controllers": Sampled},
         }
         for each, kind in kinds.items():
             put(self, each, several(getattr(self, each), kind, f"{here}: {each}"))
@@ -196,11 +192,7 @@ class System:
 
     def __repr__(self) -> str:
         named = {each: getattr(self, each) for each in ("bodies", "contacts", "supervisors")}
-        told = (
-            f"{kind} {cut(', '.join(each.name for each in parts))}"
-            for kind, parts in named.items()
-            if parts
-        )
+        told = [f"{k} {cut(', '.join(u.name for u in us))}" for k, us in named.items() if us]
         return f"<System {cut(self.name)!r}: {'; '.join(told)}>"
 
     def _signal(self, name: str, given: Any, here: str) -> Signal | str:

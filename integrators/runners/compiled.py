@@ -40,10 +40,10 @@ from integrators.machine_code.layout import BlockLayout, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.tree import Local, OuterEntry
+from integrators.machine_code.tuning import HOT, INLINE
 from integrators.runners import columns, observing, repeating, stepping, varying
 from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
 from integrators.runners.stepping import Sample
-from integrators.runners.tuning import HOT, INLINE
 from integrators.sliding import Functions, Held, Sliding
 from integrators.steps import Coefficients
 from integrators.switching import jolts, sliding_bounds

@@ -43,7 +43,7 @@ from gms_fsm.language import (
 from gms_fsm.session.explain import NOTHING, ROUNDING
 from gms_fsm.traces.trace import Trace
 from gms_fsm.verification.prove import Report
-from integrators.machine_code.javascript import library_text
+from integrators.machine_code.script.javascript import library_text
 from plots.output import formats
 from plots.page._rows import page_rows
 from plots.page._run import stored_run, views_of

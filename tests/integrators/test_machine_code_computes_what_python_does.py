@@ -25,12 +25,12 @@ from integrators.machine_code import llvm, objects
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.front_end.translate import HostFunction, TranslationError, Translator
 from integrators.machine_code.front_end.values import ArrayValue, NumberValue
-from integrators.machine_code.javascript import javascript_text, library_text
 from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.llvm import llvm_text
+from integrators.machine_code.script.javascript import javascript_text, library_text
 from integrators.machine_code.tree import Const, Local
+from integrators.machine_code.tuning import INLINE
 from integrators.runners import columns, stepping
-from integrators.runners.tuning import INLINE
 from integrators.step_size import retry_factor
 from integrators.switching import sliding_bounds
 from tests.soak.platforms import CLibrary

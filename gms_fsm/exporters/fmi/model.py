@@ -23,10 +23,10 @@ from gms_fsm.run.stepped.memory import arguments_of
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout, MemoryBlock
+from integrators.machine_code.tuning import INLINE
 from integrators.runners import exchange, stepping
 from integrators.runners.compiled import is_known
 from integrators.runners.exchange import Exchange
-from integrators.runners.tuning import INLINE
 
 ENTRIES: Mapping[str, tuple[Any, str]] = {
     **STEPS,

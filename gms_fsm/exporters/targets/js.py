@@ -38,14 +38,14 @@ from gms_fsm.systems.signals import Function
 from integrators import hybrid, loop
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
-from integrators.machine_code.javascript import javascript_text, script_number, tables_of
 from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
+from integrators.machine_code.script.javascript import javascript_text, script_number, tables_of
 from integrators.machine_code.tree import Local
+from integrators.machine_code.tuning import INLINE
 from integrators.runners import columns
 from integrators.runners.compiled import RECORD, RecordArguments, is_known
 from integrators.runners.observing import observe_rows
 from integrators.runners.stepping import FULL_LOG
-from integrators.runners.tuning import INLINE
 
 GROWING = {
     "buffers.out.rows_t": "rows_t",

@@ -105,7 +105,7 @@ class Task:
     @cached_property
     def placed(self) -> Mapping[Place, Course]:
         """The stretches of records with rows to train on, up to the last of them."""
-        found = {}
+        found: dict[Place, Course] = {}
         for i, record in enumerate(self.records):
             along = self.along(record, training_rows(record, self.options))
             found |= {(i, j): each.ended() for j, each in enumerate(along) if each.rows.any()}

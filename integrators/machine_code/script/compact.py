@@ -8,7 +8,7 @@ import string
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 
-from integrators.machine_code.javascript import HELPERS, RESERVED
+from integrators.machine_code.script.javascript import HELPERS, RESERVED
 
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*")

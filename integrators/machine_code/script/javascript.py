@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from integrators.machine_code.c99 import CFields, CNames, CWriter, calls
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
-from integrators.machine_code.locals import declarations, without_copies
+from integrators.machine_code.script.locals import declarations, without_copies
 from integrators.machine_code.tree import (
     Address,
     AddressOf,

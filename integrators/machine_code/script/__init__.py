@@ -1,0 +1,1 @@
+"""The form of machine code that browsers run: JavaScript, its memory placed, its text short."""
