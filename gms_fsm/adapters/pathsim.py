@@ -77,7 +77,7 @@ def friction_block(
     begin = functools.partial(
         FrictionState, model_or_contact, initial=initial, rtol=rtol, engine=engine
     )
-    return _block_class()(_Friction(begin), period)
+    return _block_class()(_OneFriction(begin), period)
 
 
 def system_block(
@@ -141,10 +141,10 @@ def system_block(
     period = checked_scalar("period", period, "> 0")
     names = tuple(listed("outputs", outputs, "names of values"))
     begin = functools.partial(SystemState, system, initial=initial, rtol=rtol, engine=engine)
-    return _block_class()(_Whole(begin, names), period)
+    return _block_class()(_WholeSystem(begin, names), period)
 
 
-class _Friction:
+class _OneFriction:
     """What the block asks of a friction; the first of its inputs is the velocity."""
 
     def __init__(self, begin: Any) -> None:
@@ -165,7 +165,7 @@ class _Friction:
         return dict(zip(self.inputs[1:], zip(before[1:], now[1:], strict=True), strict=True))
 
 
-class _Whole:
+class _WholeSystem:
     """What the block asks of a system."""
 
     def __init__(self, begin: Any, outputs: tuple[str, ...]) -> None:
@@ -201,7 +201,7 @@ def _block_class() -> Any:
 
         linearizable = False
 
-        def __init__(self, inner: _Friction | _Whole, period: float) -> None:
+        def __init__(self, inner: _OneFriction | _WholeSystem, period: float) -> None:
             self._inner = inner
             self.input_port_labels = {name: port for port, name in enumerate(inner.inputs)}
             self.output_port_labels = {name: port for port, name in enumerate(inner.outputs)}

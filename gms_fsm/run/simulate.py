@@ -30,7 +30,7 @@ from gms_fsm.run.recording.until import SeenUntil, Until
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.run.stepped.controlled import controlled
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.mounted import arguments_of
+from gms_fsm.systems.mounted import arguments_of, with_inputs
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import SignalLike
 from gms_fsm.systems.system import System
@@ -157,15 +157,12 @@ def simulate(
     chosen = Settings.of(settings, "simulate", **given)
     on, end = arguments_of("simulate", model, rig, t_end)
     if inputs is not None:
-        if not isinstance(model, System):
-            raise ParameterError("only a system has inputs", place="inputs", value=inputs)
-        model = model.with_inputs(inputs)
+        model = with_inputs(model, inputs)
     if progress is not None and not callable(progress):
         raise ParameterError(
             "it must be a function of the moment reached", place="progress", value=progress
         )
-    if isinstance(model, System):
-        model = controlled(model, end, chosen, t_start=t_start, initial=initial)
+    model = controlled(model, end, chosen, t_start=t_start, initial=initial)
     path = None if checkpoint is None else checked_path("checkpoint", checkpoint)
     if machines is not None and chosen.engine == "ifelse":
         raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")

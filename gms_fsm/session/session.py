@@ -90,8 +90,7 @@ class Session:
     ) -> None:
         self.settings = checked_settings(settings, options)
         on, end = arguments_of("Session", model, rig, t_end)
-        if isinstance(model, System):
-            model = controlled(model, end, self.settings, t_start=t_start, initial=initial)
+        model = controlled(model, end, self.settings, t_start=t_start, initial=initial)
         self.made_of = model, on, end
         what = mounted(model, on, self.settings.held_period)
         self.tree = Tree(what, end, t_start, initial, self.settings)

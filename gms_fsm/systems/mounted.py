@@ -18,7 +18,7 @@ from gms_fsm.systems.models import Model, is_model
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.reading.assembly import Assembly
 from gms_fsm.systems.rigs import Prescribed, Rig
-from gms_fsm.systems.signals import Signal
+from gms_fsm.systems.signals import Signal, SignalLike
 from gms_fsm.systems.system import System, system_of
 
 
@@ -219,6 +219,13 @@ def mounted(model: Model | System, rig: Rig | None = None, period: float | None 
     if bound := {*getattr(rig, "inputs", {})} & {*getattr(model, "inputs", {})}:
         own = replace(own, inputs={**own.inputs, **{name: name for name in bound}})
     return Mounted(system_of(own, rig, period), own, rig, named=False)
+
+
+def with_inputs(model: Model | System, inputs: Mapping[str, SignalLike]) -> System:
+    """Return a system with signals for its inputs."""
+    if not isinstance(model, System):
+        raise ParameterError("only a system has inputs", place="inputs", value=inputs)
+    return model.with_inputs(inputs)
 
 
 OF_ANOTHER_PLACE = {  # what is often given where it does not belong, by the name of its class

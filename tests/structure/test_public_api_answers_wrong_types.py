@@ -257,7 +257,7 @@ def _by_entry() -> dict[str, dict[str, Any]]:
         "Session.break_on": {"kind": "tested"},
         "Session.watch": {"expression": "z1", "text": "z1"},
         "System.body": {"name": "mass"},
-        "SystemState": {"t": 0.0},
+        "SystemState": {"system": SYSTEM, "t": 0.0, "t_end": 1.0},
         "SystemState.restore": {"snapshot": SystemState(SYSTEM).snapshot()},
         "SystemState.peek": {"names": "x"},
         "SystemState.value": {"name": "x"},

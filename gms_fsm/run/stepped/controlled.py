@@ -20,6 +20,7 @@ from gms_fsm.foundation.arguments import unknown
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.stepped.plant import Plant
 from gms_fsm.run.ticks import Clock, ticks_of
+from gms_fsm.systems.models import Model
 from gms_fsm.systems.parts import Sampled
 from gms_fsm.systems.signals import Corners, Function, piecewise_linear
 from gms_fsm.systems.system import System
@@ -30,20 +31,21 @@ NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY
 
 
 def controlled(
-    system: System,
+    model: Model | System,
     t_end: float,
     settings: Settings,
     *,
     t_start: float = 0.0,
     initial: Mapping[str, Any] | None = None,
-) -> System:
-    """Return a system in which what Python functions return is a record; any other as it is."""
-    if not system.controllers:
-        return system
+) -> Model | System:
+    """Return a system in which what Python functions return is a record; all else as it is."""
+    if not getattr(model, "controllers", ()):
+        return model
+    system: Any = model
     outputs = tuple(name for each in system.controllers for name in each.outputs)
     start = checked_scalar("t_start", t_start, "finite")
     end = checked_scalar("t_end", t_end, "finite")
-    plain = replace(system, controllers=(), inputs=(*system.inputs, *outputs))
+    plain: System = replace(system, controllers=(), inputs=(*system.inputs, *outputs))
     given = {
         name: each
         for name, each in plain.signals.items()

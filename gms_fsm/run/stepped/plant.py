@@ -289,7 +289,10 @@ class Plant:
 
     def value(self, name: str) -> float:
         """Return the present value of a name."""
-        found = self._places.get(name)
+        try:
+            found = self._places.get(name)
+        except TypeError:  # a list, for example
+            raise unknown("name", name, self.names) from None
         if found is None:
             if name not in self.names:
                 raise unknown("name", name, self.names)
