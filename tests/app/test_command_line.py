@@ -209,7 +209,7 @@ def test_an_export_begins_where_its_scenario_begins(gms_fsm: CommandLine) -> Non
     said(gms_fsm("export", "own.toml", "--to", "c99", "-o", "out"))
     assert "/* Begin at t = 0.5 s. */" in Path("out/own.h").read_text()
     assert Path("out/own_record.csv").read_text().splitlines()[1].startswith("0.5,")
-    x = re.search(r"w\[\d+\]\.f = (\S+); /\* buffers\.now\.y \*/", Path("out/own.c").read_text())
+    x = re.search(r"block->now\.y\[0\] = (\S+);", Path("out/own.c").read_text())
     assert x
     assert 1e-3 < float(x[1]) < 5e-3  # m; the record says mm
 
