@@ -1,7 +1,7 @@
 """How a play bank predicts the damper: one record, one amplitude or one speed left out at a time.
 
 Run as ``python docs/make_damper_study.py FOLDER``, the folder with the public records; it takes a
-minute and prints what `docs/howto/choose.md` says. Terms are chosen anew in each fold.
+minute or two. Terms are chosen anew in each fold.
 """
 
 from __future__ import annotations
