@@ -47,7 +47,7 @@ def _slid_away(
     limit = SLIDING * specimen.bench.bristle
     x, applied = trace.x, way.force(trace.t)
     moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)
-    end = int(np.argmax(moved > limit)) + 1
+    end = int(np.argmax(moved > limit))
     numbers = (
         MeasuredNumber("force at which it slides away", float(applied[end - 1]), "N"),
         MeasuredNumber("stroke up to which it would be pre-sliding", 1e6 * limit, "µm"),

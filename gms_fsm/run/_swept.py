@@ -238,10 +238,13 @@ class Sweep:
         Returns
         -------
         Dataset
-            Dimensions ``run``, ``element`` (from 1) and, with rows, ``time``; units as attributes.
+            Dimensions ``run``, ``element`` (from 1) and, with rows, ``time``; units as
+            attributes, as far as they are the same for all.
         """
         xarray = require("xarray", "sweep")
-        units = {name: QUANTITIES[name].unit for name in ("t", "x", "v", "F", "z")}
+        # Contacts of a system may turn, or not; a column has all of them.
+        known = ("t",) if self.contacts else ("t", "x", "v", "F", "z")
+        units = {name: QUANTITIES[name].unit for name in known}
         data: dict[str, Any] = {}
         shown = [name for name in ("x", "v", "F") if self._has(getattr(self, name))]
         for name in ("outcome", "message", "t", *shown):
