@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing
-from gms_fsm.foundation.display import short_repr
 from gms_fsm.foundation.extras import has_machine_code
 from gms_fsm.gradients.directions import INITIAL
 from gms_fsm.gradients.linear import Directions, Linear
@@ -38,8 +37,7 @@ LAST = 60  # switches among which a return is looked for
 ROUGHLY = 0.02  # a return of this part of the size is one, if none is better
 
 
-@short_repr
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LimitCycle:
     """A periodic motion.
 
@@ -68,7 +66,7 @@ class LimitCycle:
     >>> cycle = limit_cycle(pad, Belt(1.0, 2.0, 0.1),
     ...                     near=simulate(pad, Belt(1.0, 2.0, 0.1), 40.0))
     >>> cycle, cycle.stable
-    (<LimitCycle: period 8.44 s, 2 switches, stable>, True)
+    (<LimitCycle: period 7.61 s, 2 switches, stable>, True)
     """
 
     period: float
@@ -84,10 +82,10 @@ class LimitCycle:
         """Whether every small deviation dies out."""
         return bool((np.abs(self.multipliers) < 1.0).all())
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         count = len(self.trace.transitions)
         word = "stable" if self.stable else "unstable"
-        return f"period {self.period:.3g} s, {count} switches, {word}"
+        return f"<LimitCycle: period {self.period:.3g} s, {count} switches, {word}>"
 
 
 @refusing(rig="limit_cycle(model, rig, near=trace), or limit_cycle(system, near=trace)")
@@ -139,7 +137,7 @@ def limit_cycle(
     >>> from gms_fsm import LuGre, Slider, Stribeck
     >>> model = LuGre(sigma_0=1e3, sigma_1=30.0, sigma_2=4.0, stribeck=Stribeck(1.0, 1.5, 0.1))
     >>> cycle = limit_cycle(model, Slider(1.0, "20*sin(2*pi*t)"), period=1.0)
-    >>> cycle.driven, cycle.stable, abs(cycle.multipliers[0]) < 0.5
+    >>> cycle.driven, cycle.stable, bool(abs(cycle.multipliers[0]) < 0.5)
     (True, True, True)
     """
     if settings is None:
