@@ -2130,10 +2130,14 @@ _TOUCH = {"events": "step", "max_step": 0.01}
 rows = {
     "by what is unknown": ("", ..., lambda: derived(["F_x"])),
     "by an initial value that is unknown": ("sensitivities", ..., lambda: derived(["initial.w"])),
-    "by one number twice": ("sensitivities", ..., lambda: derived(["F_s", "F_s"])),
+    "by one number twice": (
+        "sensitivities",
+        ("F_s", "F_s"),
+        lambda: derived(["F_s", "F_s"]),
+    ),
     "by what stands in the text": ("sensitivities", "delta", lambda: derived(["delta"])),
-    "of what is unknown": ("of", "w", lambda: derived(["F_s"], "w")),
-    "by another one": ("to", "k1", lambda: derived(["F_s"], to="k1")),
+    "of what is unknown": ("of", ..., lambda: derived(["F_s"], "w")),
+    "by another one": ("to", ..., lambda: derived(["F_s"], to="k1")),
     "without any": ("sensitivity", ..., lambda: derived([])),
     "of switches not located": ("events", "step", lambda: derived(["F_s"], **_TOUCH)),
     "until": ("until", "v > 1", lambda: derived(["F_s"], until="v > 1")),

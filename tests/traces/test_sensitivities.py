@@ -24,7 +24,9 @@ def touching(height: float) -> Trace:
         outputs={"F": "k * z"},
     )
     model = ChartModel(chart, {"h": height, "k": 2.0})
-    return simulate(model, Prescribed([(0, 1), (1, 0), (2, -1)]), 1.5, sensitivities=("h", "k", "initial.z"))
+    return simulate(
+        model, Prescribed([(0, 1), (1, 0), (2, -1)]), 1.5, sensitivities=("h", "k", "initial.z")
+    )
 
 
 def test_a_crossing_has_the_derivative_of_its_root():
