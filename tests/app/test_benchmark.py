@@ -152,7 +152,6 @@ def test_fits_of_later_splits_begin_at_the_first_one(
             predict=lambda record: np.zeros(len(record)),
             task=task,
             model=task.subject.model,
-            begin="relaxed",
             choice=SimpleNamespace(chosen="GMS 1"),
         )
 
@@ -168,7 +167,7 @@ def test_fits_of_later_splits_begin_at_the_first_one(
     assert row.note == ("GMS 1" if name == "choose" else "")
     options = [task.options for task in tasks]
     assert [each.search for each in options] == ["hops", "local", "local"]
-    assert [each.begin for each in options] == [None, "relaxed", "relaxed"]
+    assert [each.begin for each in options] == [None, tasks[0].begin, tasks[0].begin]
     assert len({each.free for each in options}) == 1
     assert row.free == len(options[0].free)
     assert [*row.by_record] == ["test1", "test1.1", "test1.2"]
