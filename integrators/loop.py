@@ -133,9 +133,8 @@ def run_to_event(
             if plan.lasting > 0:
                 switch.tick(plan.lasting, now.t, now.y, now.mode, p)
             left = _ask(switch, now, memory, sliding, p)
-            if (
-                len(sliding.surfaces.rise) > 0 and left >= 0
-            ):  # an edge of the other mode is enabled: go there first
+            # An edge of the other mode is enabled: go there first.
+            if len(sliding.surfaces.rise) > 0 and left >= 0:
                 leave(on, now, relations, left)
                 return SLID
             _only_due(plan, memory)

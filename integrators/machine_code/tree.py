@@ -128,6 +128,7 @@ class Invoke:
     kind: str
     name: str
     arguments: tuple[Expr, ...]
+    writes: bool = field(default=False, compare=False)  # also without memory among its arguments
 
 
 @dataclass(frozen=True)
@@ -177,8 +178,8 @@ def may_write(expr: Expr) -> bool:
     >>> may_write(Invoke("f", "sin", (Local("f", "x"),)))
     False
     """
-    made = (each for each in parts_of(expr) if isinstance(each, Invoke))
-    return any(part.kind == "p" for each in made for part in each.arguments)
+    made = [each for each in parts_of(expr) if isinstance(each, Invoke)]
+    return any(each.writes or any(u.kind == "p" for u in each.arguments) for each in made)
 
 
 def parts_of(expr: Expr) -> Iterator[Expr]:

@@ -20,6 +20,7 @@ from integrators.machine_code.tree import (
     Local,
     Module,
     TypedFunction,
+    may_write,
 )
 
 
@@ -61,8 +62,8 @@ def placed(module: Module, known: Mapping[str, Const]) -> Module:
     def shorter(part: Any) -> Any:
         if not isinstance(part, Invoke):
             return part
-        left = (u for k, u in enumerate(part.arguments) if k not in gone[part.name])
-        return replace(part, arguments=tuple(left))
+        left = tuple(u for k, u in enumerate(part.arguments) if k not in gone[part.name])
+        return replace(part, arguments=left, writes=may_write(part))
 
     functions = [replace(each, body=_changed(each.body, shorter)) for each in reversed(done)]
     return replace(module, functions=functions)
