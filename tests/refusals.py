@@ -2194,8 +2194,15 @@ rows = {
     "words": ({"F_s": ["much", "more"]},),
     "ragged": ({"k": [[1, 2], [1]]},),
     "nothing": ({"F_s": None},),
+    "initial value for other elements": ({"initial.z": np.ones((2, 3))},),
+    "initial value of one element, wide": ({"initial.z2": np.ones((2, 4))},),
 }
 group("parameters of a sweep", ParameterError, sweeping, rows, "")
+rows = {
+    "unknown initial value": ("parameters", ..., {"initial.q": [1.0]}),
+    "period of what does not tick": ("parameters", ..., {"friction.period": [1.0]}),
+}
+group("parameters of a sweep", ParameterError, sweeping, rows)
 rows = {
     "one number": ("parameters['F_s']", 1.5, {"F_s": 1.5}),
     "one number, wide": ("parameters['k']", 1.5, {"k": 1.5}),

@@ -18,9 +18,12 @@ from gms_fsm.foundation.arguments import unknown
 from gms_fsm.foundation.files import csv_text, output_folder, refuse_input, write_text
 from gms_fsm.foundation.quantities import in_si
 from gms_fsm.foundation.text import plain, table_lines
+from gms_fsm.gradients.directions import INITIAL
+from gms_fsm.run.repeated.beginnings import periods_of
 from gms_fsm.run.sweep import Sweep, sweep
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in
+from gms_fsm.traces.system_scope import units_of
 
 __all__ = ["Axis", "axis", "sweep_scenario", "sweep_summary", "swept"]
 
@@ -134,7 +137,7 @@ def sweep_scenario(
         If the folder is not writable, or a file would replace one that was not written by gms-fsm
         or that is an input.
     """
-    _check(axes, _known(loaded))
+    _check(axes, _known(loaded, axes))
     names = ["summary.md", "runs.csv", "sweep.npz"]
     folder = output_folder(folder, names)
     for name in names:
@@ -170,7 +173,7 @@ def swept(
     ParameterError
         If a name is unknown, or there are too many runs.
     """
-    _check(axes, _known(loaded))
+    _check(axes, _known(loaded, axes))
     grid = np.meshgrid(*(each.values for each in axes), indexing="ij")
     parameters = {each.name: values.ravel() for each, values in zip(axes, grid, strict=True)}
     options: dict[str, Any] = dict(loaded.arguments)
@@ -185,10 +188,16 @@ def swept(
         return sweep(*(*loaded.subject, parameters), engine=engine, coverage=coverage, **options)
 
 
-def _known(loaded: Loaded) -> tuple[Parameter, ...]:
-    """Return the parameters that can be varied."""
+def _known(loaded: Loaded, axes: Sequence[Axis]) -> tuple[Parameter, ...]:
+    """Return the parameters that can be varied; of initial values those that are."""
     what = mounted(loaded.system or loaded.model, loaded.rig)
-    return tuple(replace(each, name=name) for name, (each, _) in known_in(what).items())
+    begun = [each.name for each in axes if each.name.startswith(INITIAL)]
+    units = units_of(what, [name.removeprefix(INITIAL) for name in begun])
+    known = {**known_in(what), **periods_of(what)}
+    return (
+        *(replace(each, name=name) for name, (each, _) in known.items()),
+        *(Parameter(name, units.get(name.removeprefix(INITIAL), "")) for name in begun),
+    )
 
 
 def _check(axes: Sequence[Axis], known: Sequence[Parameter]) -> None:
@@ -232,7 +241,7 @@ def sweep_summary(loaded: Loaded, axes: Sequence[Axis], result: Sweep, engine: s
     str
         Markdown: the parameters varied, the outcomes of the runs, a table of the first runs.
     """
-    units = {each.name: each.unit for each in _known(loaded)}
+    units = {each.name: each.unit for each in _known(loaded, axes)}
     bad = int((result.outcome != "ok").sum())
     heads = [f"{each.name} [{units[each.name]}]".removesuffix(" []") for each in axes]
     numbers = [result.parameters[each.name] for each in axes]

@@ -40,7 +40,7 @@ def directions_of(
     rows: dict[int, np.ndarray] = {}
     for c, name in enumerate(given):
         if isinstance(name, str) and name.startswith(INITIAL):
-            places = _initial(program, name)
+            places = initial_places(program, name, "sensitivities")
             start[places, c] = 1.0
             scales[c] = max((abs(y[k]) for k in places), default=0.0) or 1.0
             continue
@@ -66,15 +66,15 @@ def directions_of(
     return Directions(given, changes, rows, start, scales)
 
 
-def _initial(program: Program, name: str) -> list[int]:
-    """Return the places of an initial value in the state vector."""
+def initial_places(program: Program, name: str, place: str) -> list[int]:
+    """Return the places of an initial value, such as ``initial.z2``, in the state vector."""
     layout, plain = program.layout, name.removeprefix(INITIAL)
     known: dict[str, list[int]] = {}
-    for key, place in layout.keys.items():
-        places = [*layout.y.all_of(place)]
+    for key, here in layout.keys.items():
+        places = [*layout.y.all_of(here)]
         known[key] = places
-        if place in layout.y.own:
+        if here in layout.y.own:
             known |= {column_name(key, i): [k] for i, k in enumerate(places)}
     if plain not in known:
-        raise unknown("initial value", plain, known, place="sensitivities")
+        raise unknown("initial value", plain, known, place=place)
     return known[plain]

@@ -222,13 +222,14 @@ class Problem:
             initial=initial,
         )
 
-    def with_numbers(self, what: Mounted) -> Problem:
-        """Return the same start with different numbers; signals and initial values stay."""
+    def with_numbers(self, what: Mounted, initial: Mapping[str, Any] | None = None) -> Problem:
+        """Return the same start with different numbers, and initial values if given."""
+        initial = self.initial if initial is None else initial
         program = replace(self.program, p=arguments(what.system))
         scales = scales_of_system(program)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
-        y, _ = _initial(what, program, self.t_start, self.initial)
+        y, _ = _initial(what, program, self.t_start, initial)
         span = self.t_start, self.last
         floor = _floor(what.system, program, tolerances, span, y, self.mode)
         return replace(
@@ -236,6 +237,7 @@ class Problem:
             what=what,
             program=program,
             y=y,
+            initial=initial,
             options=replace(
                 self.options,
                 atol=tolerances,

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut, shown
 from gms_fsm.foundation.arguments import checked_kind, meant, refusing, unknown
+from gms_fsm.gradients.directions import INITIAL
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.printing.counting import Counting, counting_of
 from gms_fsm.lowering.program import same_text
@@ -25,6 +26,12 @@ from gms_fsm.run._swept import LOG, LONGEST, Sweep
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.recording.counted import LARGE, CountTables
+from gms_fsm.run.repeated.beginnings import (
+    initial_size,
+    periods_of,
+    with_initial,
+    with_periods,
+)
 from gms_fsm.run.repeated.block import RepeatedRun
 from gms_fsm.run.repeated.collected import (
     Collected,
@@ -79,8 +86,9 @@ def sweep(
         elements, (runs, n) for one per element. Names are the chart's parameters (``k``, ``sigma``,
         ``C``, ``v_c``), ``weights``, ``sigma_2``, ``F_c``, ``F_s``, ``v_s``, ``delta``, and the
         rig's numbers (``mass``, ``stiffness``, ``speed``). Of a system, ``numbers.m`` is one of its
-        numbers, and ``gear.F_s`` a parameter of the contact gear. In a DataFrame, use ``k1``,
-        ``k2`` ... for elements.
+        numbers, and ``gear.F_s`` a parameter of the contact gear. ``initial.v`` and ``initial.z2``
+        are initial values, as `initial` names them; ``pid.period`` is the period of what ticks. In
+        a DataFrame, use ``k1``, ``k2`` ... for elements.
     executor : concurrent.futures.Executor, optional
         Where to run: a process pool, or the executor of a Dask ``Client`` (extra ``cluster``).
         Threads on this machine if omitted; compiled runs release the interpreter lock.
@@ -129,8 +137,9 @@ def sweep(
     what = mounted(model, on, begin.settings.held_period)
     if begin.settings.engine == "compiled":
         check_llvmlite()
-    begin = begin.counting(begin.start(what))  # errors common to all runs are raised once, here
-    values = _values(what, given)
+    first = begin.start(what)  # errors common to all runs are raised once, here
+    begin = begin.counting(first)
+    values = _values(first, given)
     runs = len(next(iter(values.values())))
     if executor is not None and not hasattr(executor, "submit"):
         raise ParameterError(
@@ -172,9 +181,10 @@ def sweep(
 
 # --------------------------------------------------------------------------- parameters
 def _values(
-    what: Mounted, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
+    start: Problem, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
 ) -> dict[str, FloatArray]:
     """Check the names and shapes of the parameters."""
+    what = start.what
     if not hasattr(parameters, "keys"):
         called = "system" if what.named else "model, rig"
         raise ParameterError(
@@ -183,7 +193,7 @@ def _values(
             place="parameters",
             value=parameters,
         )
-    names = known_in(what)
+    names = {**periods_of(what), **known_in(what)}
     given = {str(name): parameters[name] for name in parameters}
     if not isinstance(parameters, Mapping):
         given = _elements_joined(given, names)
@@ -191,13 +201,14 @@ def _values(
         raise ParameterError("parameters is empty", advice="give at least one name with its values")
     arrays: dict[str, FloatArray] = {}
     for name, value in given.items():
-        if name not in names:
+        begins = name.startswith(INITIAL) and name not in names
+        if not begins and name not in names:
             raise unknown("parameter", name, names, place="parameters")
         try:
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
             raise ParameterError(f"parameters[{name!r}] is not an array of numbers") from None
-        _, n = names[name]
+        n = initial_size(start, name) if begins else names[name][1]
         if array.shape[1:] not in (((), (n,)) if n else ((),)) or array.ndim == 0:
             if array.ndim == 0 and value is not None:
                 raise ParameterError(
@@ -262,11 +273,12 @@ class _Common:
         large = found is not None and found.size > LARGE
         return self if large and start.chosen.engine != "compiled" else replace(self, counted=found)
 
-    def start(self, what: Mounted) -> Problem:
+    def start(self, what: Mounted, initial: Mapping[str, Any] | None = None) -> Problem:
         settings = self.settings
         if self.coverage and self.counted is None and settings.output == "end":
             settings = replace(settings, output="all")
-        return Problem.on(what, self.t_end, settings, t_start=self.t_start, initial=self.initial)
+        given = self.initial if initial is None else initial
+        return Problem.on(what, self.t_end, settings, t_start=self.t_start, initial=given)
 
 
 def _chosen(settings: Settings | None, options: SettingOptions) -> Settings:
@@ -322,21 +334,34 @@ def _each(
     """Make runs one by one: with numbers that are another program, or that may be refused."""
     results: dict[int, RunResult] = {}
     compiled: CompiledRun | None = None
+    known = known_in(what)
+    others = [name for name in part if name not in known]
+    periods = [name for name in others if not name.startswith(INITIAL)]
+    first = begin.start(what) if len(others) > len(periods) else None
     for row in rows:
         values = {name: array[row] for name, array in part.items()}
         run: Run | CompiledRun | None = None
         outcome, message = "ok", ""
         try:
-            its = varied(what, values)
-            if compiled is not None and same_text(compiled.start.system, its.system):
-                compiled.reset(its)  # the same buffers and machine code
+            its = varied(what, {name: each for name, each in values.items() if name in known})
+            its = with_periods(its, {name: values[name] for name in periods})
+            begun = None
+            if first is not None:
+                given = {name: values[name] for name in others if name not in periods}
+                begun = with_initial(first, given)
+            if (
+                compiled is not None
+                and not periods
+                and same_text(compiled.start.system, its.system)
+            ):
+                compiled.reset(its, begun)  # the same buffers and machine code
                 run = compiled
             elif begin.settings.engine == "compiled":
-                run = compiled = CompiledRun(begin.start(its), tables=tables)
+                run = compiled = CompiledRun(begin.start(its, begun), tables=tables)
                 if compiled.start.program.plan.steps:  # the numbers say at which times it stops
                     compiled = None
             else:
-                run = Run(begin.start(its), tables=tables)
+                run = Run(begin.start(its, begun), tables=tables)
             while run.advance():
                 pass
         except GMSError as error:

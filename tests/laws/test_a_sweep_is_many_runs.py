@@ -5,15 +5,19 @@ Whatever the engine, whatever is recorded; from a file it comes back as it was s
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from gms_fsm import Sweep, Trace, simulate, sweep
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in, value_in, varied
 from tests.corpus import FAILING, FEW, QUICK, each, in_turn, outcome, run
+from tests.exporters.frictions import servo
+from tests.helpers import FASTEST
 
 FACTORS = (1.0, 1.01, 0.99)  # of every number at once
 LEFT_OUT = {"numbers.V"}  # the velocity that a run begins with
@@ -91,3 +95,28 @@ def test_a_failure_is_the_outcome_of_its_run(name: str) -> None:
         assert said.startswith(f"{found.outcome[k]}: {found.message[k]}")
         assert found.t[k] == (part.t[-1] if len(part) else one.how.get("t_start", 0.0))
         assert found.transition_count[k] == len(part.transitions)
+
+
+@pytest.mark.parametrize("engine", sorted({"ifelse", FASTEST}))
+def test_initial_values_and_periods_vary_by_name(engine: str, tmp_path: Path) -> None:
+    system, z, x = servo(), np.arange(12.0).reshape(3, 4) * 1e-7, [0.0, 1e-4, -2e-4]
+    periods, F_c, z2 = [1e-3, 2e-3, 7e-4], [1.0, 1.1, 1.2], [3e-7, 4e-7, 5e-7]
+    given = {"initial.load.x": x, "initial.I": [0.1, 0.0, 0.2], "bearing.F_c": F_c}
+    wide = {**given, "pid.period": periods, "initial.bearing.z": z}
+    single = {**given, "initial.z2": z2}
+    begin = {"bearing.z": [1e-7] * 4, "x_l": 9.0}
+    for found in (
+        sweep(system, 0.02, wide, engine=engine, initial=begin),
+        sweep(system, 0.02, single, engine=engine, initial=begin),
+    ):
+        for k in range(3):
+            deflections = z[k] if "pid.period" in found.parameters else [1e-7, z2[k], 1e-7, 1e-7]
+            period = periods[k] if "pid.period" in found.parameters else 1e-3
+            its = varied(mounted(system), {"bearing.F_c": F_c[k]}).system
+            its = replace(its, sampled=(replace(its.sampled[0], period=period),))
+            initial = {"load.x": x[k], "I": given["initial.I"][k], "bearing.z": deflections}
+            one = simulate(its, 0.02, initial=initial, engine=engine)
+            assert found.ends["load.x"][k] == one.body("load").x[-1] != 0.0
+            assert found.ends["u"][k] == one.value("u")[-1]
+            assert found.transition_count[k] == len(one.transitions)
+        same(Sweep.load(found.save(tmp_path / "runs.npz")), found)

@@ -94,9 +94,9 @@ class CompiledRun:
                 _, edge = self.start.edge(memory.machine, memory.edge)
                 self.engine.set_state(memory.machine, edge.target)
 
-    def reset(self, what: Mounted) -> None:
-        """Start over with different numbers; signals and initial values stay."""
-        self.columns.reset(what)
+    def reset(self, what: Mounted, initial: Mapping[str, Any] | None = None) -> None:
+        """Start over with different numbers, and initial values if given; signals stay."""
+        self.columns.reset(what, initial)
         self.start = self.columns.start
         self.next_look = PATIENCE
 
@@ -240,9 +240,9 @@ class Columns:
         near: Any = self.tables.near
         return tally._replace(counts=counts, near=near)
 
-    def reset(self, what: Mounted) -> None:
-        """Empty the columns and return to the start, with other numbers."""
-        self.start = self.start.with_numbers(what)
+    def reset(self, what: Mounted, initial: Mapping[str, Any] | None = None) -> None:
+        """Empty the columns and return to the start, with other numbers and initial values."""
+        self.start = self.start.with_numbers(what, initial)
         self.p = compiled.packed(self.start.program.p)
         self.empty()
 

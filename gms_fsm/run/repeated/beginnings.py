@@ -1,0 +1,84 @@
+"""What differs from run to run besides numbers: initial values and periods, by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gms_fsm.charts.parameters import FloatArray, Parameter, checked_scalar
+from gms_fsm.gradients.directions import INITIAL, initial_places
+from gms_fsm.run.problem import Problem
+from gms_fsm.systems.mounted import Mounted, mounted
+from gms_fsm.systems.parts import Sampled
+
+PERIOD = ".period"
+WORD = re.compile(r"(?<![\w.])period\b")
+
+
+def periods_of(what: Mounted) -> dict[str, tuple[Parameter, int]]:
+    """Return the periods of all that ticks in a system, as `known_in` does its numbers."""
+    parts: Any = (*what.system.sampled, *what.system.machines) if what.named else ()
+    return {
+        f"{each.name}{PERIOD}": (Parameter("period", "s", rule="> 0"), 0)
+        for each in parts
+        if each.period is not None
+    }
+
+
+def initial_size(start: Problem, name: str) -> int:
+    """Return how many elements have an initial value; 0 if it is one number."""
+    places = initial_places(start.program, name, "parameters")
+    layout, plain = start.program.layout, name.removeprefix(INITIAL)
+    return len(places) if layout.keys.get(plain) in layout.y.own else 0
+
+
+def with_periods(what: Mounted, periods: Mapping[str, float]) -> Mounted:
+    """Return a system whose parts tick with other periods; a `ParameterError` if one is not > 0.
+
+    What texts call ``period`` is a number of the system there, so all have one program.
+    """
+    if not periods:
+        return what
+    system, numbers = what.system, dict(what.system.numbers)
+
+    def other(part: Any) -> Any:
+        name = f"{part.name}{PERIOD}"
+        if name not in periods:
+            return part
+        period = checked_scalar(name, periods[name], "> 0")
+        if not isinstance(part, Sampled):
+            return part.replaced(period=period)
+        number = f"{part.name}__period"
+        updates = {each: WORD.sub(number, text) for each, text in part.updates.items()}
+        if updates != part.updates:
+            numbers[number] = period
+        return replace(part, period=period, updates=updates)
+
+    kinds = "sampled", "contacts", "supervisors"
+    parts: Any = {kind: tuple(map(other, getattr(system, kind))) for kind in kinds}
+    return mounted(replace(system, **parts, numbers=numbers))
+
+
+def with_initial(start: Problem, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the initial values of a run: those of the start, and others over them."""
+    layout = start.program.layout
+    found: dict[str, Any] = {}
+    changed: dict[str, FloatArray] = {}
+    for name, value in given.items():
+        places = initial_places(start.program, name, "parameters")
+        home = next(each for each, _ in layout.y if {*places} <= {*layout.y.all_of(each)})
+        every = layout.y.all_of(home)
+        if home not in changed:
+            changed[home] = np.array([start.y[k] for k in every])
+        changed[home][[k - every[0] for k in places]] = value
+    for key, value in start.initial.items():
+        if layout.keys.get(key) not in changed:
+            found[key] = value
+    for home, values in changed.items():
+        key = next(key for key, place in layout.keys.items() if place == home)
+        found[key] = values if home in layout.y.own else float(values[0])
+    return found
