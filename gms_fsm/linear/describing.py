@@ -14,6 +14,7 @@ from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.coupling.steppable import alone
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing, unknown
+from gms_fsm.lowering.program import refuse_functions
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import simulate
 from gms_fsm.run.stepped.memory import fast
@@ -115,6 +116,7 @@ def _driven(what: Any, given: str, output: str) -> System:
             raise ParameterError(
                 "a system needs it", place=name, advice='for example input="u", output="x"'
             )
+    refuse_functions(what)  # they would go on from one run to the next
     numbers = dict(what.numbers)
     if given not in numbers and given not in what.given:
         raise unknown("input", given, [*what.given, *numbers])

@@ -168,12 +168,7 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
     True
     """
     system = mounted(system, rig).system
-    for sampler in system.controllers:
-        raise ParameterError(
-            "it is a Python function, which cannot be written as text",
-            place=f"sampled {sampler.name!r}",
-            advice="write its updates as texts; simulate and Session call it as it is",
-        )
+    refuse_functions(system)
     if system.open:
         raise ParameterError(
             f"its inputs {', '.join(system.open)} are not given",
@@ -189,6 +184,16 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
         knots=sorted({float(t) for s in corners for t in s.times}),
         jumps=sorted({float(t) for s in corners for t in s.jumps}),
     )
+
+
+def refuse_functions(system: System) -> None:
+    """Refuse controllers that are Python functions."""
+    for sampler in system.controllers:
+        raise ParameterError(
+            "it is a Python function, which cannot be written as text",
+            place=f"sampled {sampler.name!r}",
+            advice="write its updates as texts; simulate and Session call it as it is",
+        )
 
 
 def same_text(one: System, other: System) -> bool:

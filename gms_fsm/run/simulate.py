@@ -16,7 +16,7 @@ from gms_fsm.gradients.directions import directions_of
 from gms_fsm.gradients.following import RunAsRecorded
 from gms_fsm.gradients.linear import Directions
 from gms_fsm.gradients.sensitivities import Sensitivities
-from gms_fsm.lowering.program import equations
+from gms_fsm.lowering.program import equations, refuse_functions
 from gms_fsm.run._checkpoint import Checkpointer
 from gms_fsm.run.machines import ElementMachines, IfElse, Interference, MachineEngine
 from gms_fsm.run.problem import Problem
@@ -162,13 +162,15 @@ def simulate(
         raise ParameterError(
             "it must be a function of the moment reached", place="progress", value=progress
         )
+    asked = not isinstance(sensitivities, list | tuple) or len(sensitivities) > 0
+    if asked and isinstance(model, System):
+        refuse_functions(model)  # what they return depends on the numbers, too
     model = controlled(model, end, chosen, t_start=t_start, initial=initial)
     path = None if checkpoint is None else checked_path("checkpoint", checkpoint)
     if machines is not None and chosen.engine == "ifelse":
         raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")
     start = Problem.of(model, on, end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, start.what, start.output).values() if monitors else ()
-    asked = not isinstance(sensitivities, list | tuple) or len(sensitivities) > 0
     if asked:
         check_derivable(chosen, until)
         wanted = directions_of(start.what, start.program, start.y, sensitivities)

@@ -16,19 +16,19 @@ from typing import Any
 
 import numpy as np
 
-from gms_fsm.errors import SignalError, UnitError, shown
+from gms_fsm.errors import UnitError, shown
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.foundation.quantities import UNITS, convert_numbers, factor, per_second
 from gms_fsm.foundation.quantities import in_si as number_in_si
-from gms_fsm.language import Name, Owner, evaluate, names_in, values_of
+from gms_fsm.language import Name, Owner, names_in, values_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.observing import observe
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.mounted import Mounted
-from gms_fsm.systems.signals import Corners, Function, piecewise_linear
 from gms_fsm.systems.system import Contact, System
 from gms_fsm.traces.scope import Scope, unit_of, watch_names
 from gms_fsm.traces.trace import Trace
+from gms_fsm.traces.views import given_values
 
 # What the units of SI measure; a force is a force, also where it is a normal force.
 MEASURED = {
@@ -72,28 +72,6 @@ def owners_of(system: System) -> dict[str, Owner]:
         states = tuple(state.name for state in contact.chart.states)
         found[contact.name] = Owner(first, contact.n, states)
         first += contact.n
-    return found
-
-
-def given_values(system: System, t: float) -> dict[str, float]:
-    """Return the values at a time of what is given: signals, and velocities of driven bodies."""
-    wanted = {*system.signals, *(body.v for body in system.bodies if body.driven)}
-    values: dict[str, float] = {"t": t, **system.numbers}
-    found: dict[str, float] = {}
-    for each in system.assembly.definitions:
-        if each.name not in wanted:
-            continue
-        try:
-            if isinstance(each.signal, Corners):
-                value = piecewise_linear(t, each.signal.times.tolist(), each.signal.values.tolist())
-            elif isinstance(each.signal, Function):
-                value = float(each.signal.call(t))
-            else:
-                assert each.tree is not None
-                value = float(evaluate(each.tree, values))
-        except (ArithmeticError, ValueError, TypeError, SignalError):
-            value = math.nan
-        values[each.name] = found[each.name] = value
     return found
 
 

@@ -42,6 +42,7 @@ from gms_fsm.traces.views import (
     BodyTrace,
     driven_velocity,
     dwell_times,
+    given_values,
     read_parts,
     sampled,
     sensitivity_of,
@@ -232,13 +233,13 @@ class Trace:
         return BodyTrace(name, self._named(body.x), velocity)
 
     def value(self, name: str) -> FloatArray:
-        """Return a further state or a sampled value of the system; or a value of the contact.
+        """Return a further state, sampled value or signal of the system, or what a contact has.
 
         Parameters
         ----------
         name : str
-            As in the system's ``flow`` or in the updates of a `Sampled`; or what the chart calls a
-            velocity or a force, such as ``"F_w"`` of a contact in the plane.
+            As in the system's ``flow``, ``signals``, ``inputs`` or a `Sampled`; or what the chart
+            calls a velocity or a force, such as ``"F_w"`` of a contact in the plane.
 
         Returns
         -------
@@ -255,11 +256,13 @@ class Trace:
             return self._named(name)
         bank = self.places if self.which or len(layout.banks) == 1 else None
         names = {} if bank is None else bank.plain({each: each for each in layout.observed.shared})
-        outputs = {each: each for each in self.what.system.names if each in self.seen}
-        names = {**names, **outputs}  # those of supervisors
+        names |= {u: u for u in self.what.system.names if u in self.seen}  # those of supervisors
+        signals = self.what.system.signals if self.what.named else {}
+        if isinstance(name, str) and name in signals:
+            return np.array([given_values(self.what.system, t)[name] for t in self.t.tolist()])
         if isinstance(name, str) and name in names:
             return self.seen[names[name]]
-        known = [*layout.y.shared, *(each for each in names if " " not in each)]
+        known = [*layout.y.shared, *(each for each in (*names, *signals) if " " not in each)]
         raise unknown("value", name, (u for u in known if u not in self.what.system.events))
 
     @property
@@ -392,10 +395,8 @@ class Trace:
         """
         row = checked_integer("row", row)
         on = np.flatnonzero(self.rows.mode[row, self.program.layout.slides])
-        return {
-            self.program.surface_names[k]: sigma_at(self.program, self.rows, row, int(k))
-            for k in on
-        }
+        names = self.program.surface_names
+        return {names[k]: sigma_at(self.program, self.rows, row, int(k)) for k in on}
 
     @cached_property
     def program(self) -> Program:
@@ -566,9 +567,8 @@ class Trace:
         -------
         dict of str to ndarray, shape (rows,)
             ``t, microstep, x, v, F, z1.., state1.., s1.., F1..``, and ``slides1..``: 1 where the
-            motion slides along a surface. Of a system the positions and velocities of bodies and
-            the further states by their names, and for each contact such columns with its name:
-            ``pad.v, pad.F, pad.z1..``.
+            motion slides along a surface. Of a system positions, velocities and further states by
+            their names, and for each contact such columns with its name: ``pad.v, pad.z1..``.
         """
         return columns_of(self)
 

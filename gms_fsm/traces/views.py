@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,12 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, as_numbers
-from gms_fsm.errors import OutputError, ParameterError, TraceFileError, shown
+from gms_fsm.errors import OutputError, ParameterError, SignalError, TraceFileError, shown
 from gms_fsm.foundation.arguments import no_file, some_of
 from gms_fsm.foundation.display import Log, short_repr
+from gms_fsm.language import evaluate
 from gms_fsm.lowering.observing import armed, rate, sigmas
 from gms_fsm.lowering.program import Program
-from gms_fsm.systems.system import Body
+from gms_fsm.systems.signals import Corners, Function, piecewise_linear
+from gms_fsm.systems.system import Body, System
 from gms_fsm.traces.between import between
 from gms_fsm.traces.files.parts import Parts, RunDescription, checked
 from gms_fsm.traces.files.unreadable import kind_of_file, unreadable
@@ -57,6 +60,29 @@ def driven_velocity(trace: Trace, body: Body) -> FloatArray:
     for t, y, mode in rows:
         found.append(rate(program, t, y, mode, armed(program, t, y, mode))[place])
     return np.array(found)
+
+
+def given_values(system: System, t: float) -> dict[str, float]:
+    """Return the values at a time of what is given: signals, and velocities of driven bodies."""
+    wanted = {*system.signals, *(body.v for body in system.bodies if body.driven)}
+    values: dict[str, float] = {"t": t, **system.numbers}
+    found: dict[str, float] = {}
+    for each in system.assembly.definitions:
+        if each.name not in wanted:
+            continue
+        try:
+            if isinstance(each.signal, Corners):
+                record: Any = each.signal.times, each.signal.values
+                value = float(piecewise_linear(t, *record))
+            elif isinstance(each.signal, Function):
+                value = float(each.signal.call(t))
+            else:
+                assert each.tree is not None
+                value = float(evaluate(each.tree, values))
+        except (ArithmeticError, ValueError, TypeError, SignalError):
+            value = math.nan
+        values[each.name] = found[each.name] = value
+    return found
 
 
 def steps_of(trace: Trace) -> NDArray[np.int64]:

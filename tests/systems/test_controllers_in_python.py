@@ -18,6 +18,7 @@ from gms_fsm import (
     SignalError,
     SimulationError,
     System,
+    describing_function,
     export,
     simulate,
 )
@@ -92,6 +93,23 @@ def test_the_run_is_played_again_without_a_call() -> None:
     assert len(watcher.seen) == calls == 20
 
 
+def test_the_trace_has_what_it_returned_and_the_other_signals() -> None:
+    watcher = Watcher()
+    trace = simulate(controlled(watcher), 2.0, t_eval=[0.05, 0.55, 1.95])
+    returned = [9.0 * (r - x) - v for _, x, v, r in watcher.seen]
+    assert trace.value("u").tolist() == [returned[k] for k in (0, 5, 19)]
+    np.testing.assert_allclose(trace.value("r"), np.sin(trace.t), rtol=1e-15)
+
+
+def test_parameters_with_defaults_need_no_value() -> None:
+    def given(x: float, gain: float = 3.0, v: float = 7.0) -> np.ndarray:
+        assert (gain, v) != (3.0, 7.0)
+        return np.array(gain * (1.0 - x))
+
+    trace = simulate(controlled(given), 0.05)
+    assert trace.value("u").tolist()[-1] == 3.0
+
+
 def test_a_session_calls_it_once() -> None:
     watcher = Watcher()
     session = Session(controlled(watcher), 2.0)
@@ -131,10 +149,19 @@ def test_a_run_that_stops_keeps_what_was_before() -> None:
     assert 0.0 < caught.value.trace.t[-1] < 2.0
 
 
+def test_what_repeats_runs_refuses_functions() -> None:
+    system = controlled(lambda x: -x, inputs=("w_ref",))
+    with pytest.raises(ParameterError, match="sampled 'pd': it is a Python function"):
+        describing_function(system, 1.0, 1.0, input="w_ref", output="x")
+    with pytest.raises(ParameterError, match="sampled 'pd': it is a Python function"):
+        simulate(controlled(lambda x: -x), 1.0, sensitivities=("initial.x",))
+
+
 WRONG: dict[str, Any] = {
     "unknown name": (ParameterError, lambda y: y),
     "any names": (ParameterError, lambda **values: 1.0),
     "no number": (SignalError, lambda t: "fast"),
+    "a word for a number": (SignalError, lambda t: "1.0"),
     "two numbers": (SignalError, lambda t: (1.0, 2.0)),
     "not finite": (SignalError, lambda t: float("nan")),
     "error": (SignalError, lambda t: 1.0 / t),

@@ -96,16 +96,17 @@ def _arguments(sampler: Sampled, plant: Plant) -> tuple[str, ...]:
         raise ParameterError(
             "its parameters have no names", place=here, advice="give a function of named values"
         ) from None
-    names = tuple(each.name for each in parameters if each.kind in NAMED)
     known = [*plant.names, "period"]
-    for each in parameters:
+    # A parameter with a default that names no value keeps its default.
+    asked = [each for each in parameters if each.name in known or each.default is each.empty]
+    for each in asked:
         if each.kind not in NAMED:
             raise ParameterError(
                 f"its parameter {each} names no value", place=here, advice="name each value"
             )
         if each.name not in known:
             raise unknown("value", each.name, known, place=here)
-    return names
+    return tuple(each.name for each in asked)
 
 
 def _call(
@@ -130,9 +131,9 @@ def _call(
         raise SignalError(
             f"the function raised {type(error).__name__} at t = {t!r} s: {error}", place=here
         ) from error
-    returned = found if isinstance(found, tuple | list | np.ndarray) else (found,)
     try:
-        numbers = [*map(float, returned)]
+        returned = np.atleast_1d(np.asarray(found))
+        numbers = returned.astype(float, casting="same_kind").tolist() if returned.ndim == 1 else []
     except (TypeError, ValueError):
         numbers = []
     if len(numbers) != len(sampler.outputs) or not all(map(math.isfinite, numbers)):
@@ -162,6 +163,6 @@ def _held(times: list[float], values: list[float]) -> Corners:
 
 def _line(signal: Corners, t: float, after: float) -> tuple[float, float]:
     """Return a record just after a time, and just before another one."""
-    times, values = signal.times.tolist(), signal.values.tolist()
+    record: Any = signal.times, signal.values
     before = math.nextafter(after, -math.inf)
-    return piecewise_linear(t, times, values), piecewise_linear(before, times, values)
+    return float(piecewise_linear(t, *record)), float(piecewise_linear(before, *record))

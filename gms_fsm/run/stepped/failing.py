@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.settings import MOST_STEPS
 from gms_fsm.run.stepped.memory import JointMemory
 from gms_fsm.traces.failures import (
     LivelockError,
@@ -25,7 +24,7 @@ FAILURES: Mapping[int, tuple[type[SimulationError], str]] = {
     loop.MACHINE_LIVELOCK: (LivelockError, "it keeps switching without progress"),
     loop.RELATION_LIVELOCK: (LivelockError, "a comparison keeps changing without progress"),
     advance.TOO_SMALL: (StepSizeError, "the step size fell below the resolution of the clock"),
-    loop.TOO_MANY_STEPS: (StepLimitError, f"one sample needs more than {MOST_STEPS:,} steps"),
+    loop.TOO_MANY_STEPS: (StepLimitError, "one sample needs more than max_steps steps"),
     advance.NOT_FINITE: (NotFiniteError, "the flow is NaN or infinite"),
     loop.ENTANGLED: (NotUniqueError, "it is between states on surfaces that cross: not unique"),
 }
