@@ -16,6 +16,7 @@ from gms_fsm.linear._duals import Sloped, slope_of, with_slopes
 from gms_fsm.lowering.observing import armed
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.systems.given import several
+from gms_fsm.systems.numbers import column_name
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.signals import Corners, Formula, Function
 from gms_fsm.systems.system import System
@@ -332,7 +333,7 @@ class _Seeded:
     def _label(self, name: str, element: int | None) -> str:
         label = self.program.layout.label(name)
         n = 1 if element is None else len(self.program.layout.y.all_of(name))
-        return label if n == 1 else f"{label}[{element}]"
+        return label if n == 1 or element is None else column_name(label, element)
 
     def _unit(self, name: str) -> str:
         for body in self.system.bodies:

@@ -17,6 +17,7 @@ from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import refusing
 from gms_fsm.foundation.display import short_repr
 from gms_fsm.foundation.equality import by_value
+from gms_fsm.systems.given import mapping_of
 from gms_fsm.systems.signals import Signal, SignalLike, as_signal
 from gms_fsm.systems.springs import Spring
 
@@ -82,10 +83,10 @@ class Prescribed:
 
     def __post_init__(self) -> None:
         velocity: Any = self.velocity
-        given = self.inputs
+        given: Mapping[str, Any] = mapping_of(self.inputs, "inputs")
         if hasattr(velocity, "motion"):  # a record: no class of it, which takes SciPy to import
             motion = velocity.motion()
-            given = {n: (motion.time, u) for n, u in velocity.inputs.items()} | dict(given)
+            given = {n: (motion.time, u) for n, u in velocity.inputs.items()} | given
             velocity = (motion.time, motion.velocity)
         found = {name: as_signal(each) for name, each in given.items()}
         object.__setattr__(self, "inputs", found)

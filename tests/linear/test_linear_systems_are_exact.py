@@ -1,5 +1,7 @@
 """`linearize` gives what a run does near an instant, all elements staying in their states."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
@@ -17,6 +19,7 @@ from gms_fsm import (
     State,
     Stribeck,
     System,
+    SystemState,
     Trace,
     Transition,
     linearize,
@@ -61,6 +64,15 @@ def test_sticking_elements_are_one_spring() -> None:
     np.testing.assert_array_equal(found.B, [[0], [2], [0], [0]])
     np.testing.assert_allclose(found.C[-1], [0, 0, all_k, 0], rtol=1e-15)
     np.testing.assert_array_equal(found.D, np.zeros((5, 1)))
+
+
+def test_states_and_outputs_have_the_names_of_values() -> None:
+    plant = replace(load_scenario("servo").system, sampled=(), inputs=("u",))
+    two = replace(plant, contacts=(*plant.contacts, Contact("seal", bank(), v="v_m")))
+    for system, first in ((plant, "z1"), (two, "bearing.z1")):
+        found = linearize(simulate(system, 0.1, inputs={"u": "50"}), 0.1)
+        assert first in found.states
+        assert {*found.states, *found.outputs} <= {*SystemState(system).names}
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,8 @@ from gms_fsm.language import (
 
 __all__ = ["WORDS", "modelica"]
 
-# Keywords of the Modelica language 3.6 (2.3.3), its built-in types, functions and operators.
+# Keywords of the Modelica language 3.6 (2.3.3), its built-in types, functions and operators, and
+# its standard library, which a model of that name would hide.
 WORDS = frozenset(
     re.findall(
         r"\w+",
@@ -47,7 +48,7 @@ WORDS = frozenset(
         homotopy identity inStream integer interval linspace log log10 matrix max min mod ndims
         noClock noEvent ones outerProduct pre previous product reinit rem rooted sample scalar
         semiLinear shiftSample sign sin sinh size skew smooth spatialDistribution sqrt subSample sum
-        superSample symmetric tan tanh terminal terminate transpose vector zeros
+        superSample symmetric tan tanh terminal terminate transpose vector zeros Modelica
         """,
     )
 )
