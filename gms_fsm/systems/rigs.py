@@ -83,7 +83,7 @@ class Prescribed:
 
     def __post_init__(self) -> None:
         velocity: Any = self.velocity
-        given: Mapping[str, Any] = mapping_of(self.inputs, "inputs")
+        given = mapping_of(self.inputs, "inputs")
         if hasattr(velocity, "motion"):  # a record: no class of it, which takes SciPy to import
             motion = velocity.motion()
             given = {n: (motion.time, u) for n, u in velocity.inputs.items()} | given

@@ -21,8 +21,10 @@ from gms_fsm import (
     Sampled,
     SimulationError,
     State,
+    Supervisor,
     System,
     SystemState,
+    Transition,
     simulate,
 )
 from gms_fsm.charts import CHARTS
@@ -156,6 +158,34 @@ def test_an_error_leaves_everything_as_it_was(engine: str) -> None:
     for each in (state, other):
         each.advance(0.1, u=0.5)
     assert state.value("pad.z1") == other.value("pad.z1")
+
+
+@engines
+@pytest.mark.parametrize("after", [1.0, 2.0], ids=["as before", "jumps"])
+def test_an_event_is_heard_whatever_the_inputs_do(engine: str, after: float) -> None:
+    mode = Chart(
+        "mode",
+        inputs=(),
+        velocities=(),
+        states=(State("cold", outputs={"N": "1"}), State("hot", outputs={"N": "2"})),
+        transitions=(Transition("heat", "cold", "hot", event="hot"),),
+    )
+    system = System(
+        "heated",
+        bodies=(Body("mass", inertia=1.0, force="u * mode.N + cos(t)"),),
+        contacts=(Contact("pad", stick_slip("signed")),),
+        supervisors=(Supervisor("mode", mode),),
+        inputs=("u",),
+    )
+    state = SystemState(system, engine=engine)
+    state.advance(0.1, u=1.0)
+    state.send("hot")
+    state = pickle.loads(pickle.dumps(state))
+    assert state.peek(0.1, "mode.N", u=after) == (2.0,)
+    state.advance(0.1, u=after)
+    assert state.switches[0] == (0.1, "mode", 0, "heat")
+    state.advance(0.1, u=1.0)
+    assert "heat" not in [each.edge for each in state.switches]
 
 
 def test_a_system_with_its_inputs_is_a_file(tmp_path: Any) -> None:

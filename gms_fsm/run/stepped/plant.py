@@ -154,9 +154,12 @@ class Plant:
         memory, plan = self.memory.buffers.memory, self.memory.buffers.plan
         if memory.phase == loop.JUMPING and plan.ticks[memory.jump]:
             return now, NONE  # it waits at a tick in any case
-        told = frozenset(self.logged)
+        told, y = frozenset(self.logged), self.memory.buffers.now.y
+        sent = {place: y[place] for place in self.events.values()}  # since then
         self._take(last[4])
         self._advanced(*last[:4], jumps=True)
+        for place, waits in sent.items():
+            y[place] = waits
         return self._copy(), told.difference(self.logged)
 
     def _advanced(
