@@ -186,9 +186,9 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
     )
 
 
-def refuse_functions(system: System) -> None:
-    """Refuse controllers that are Python functions."""
-    for sampler in system.controllers:
+def refuse_functions(model_or_system: object) -> None:
+    """Refuse controllers that are Python functions; models have none."""
+    for sampler in getattr(model_or_system, "controllers", ()):
         raise ParameterError(
             "it is a Python function, which cannot be written as text",
             place=f"sampled {sampler.name!r}",

@@ -230,8 +230,7 @@ class Problem:
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
         y, _ = _initial(what, program, self.t_start, initial)
-        span = self.t_start, self.last
-        floor = _floor(what.system, program, tolerances, span, y, self.mode)
+        floor = _floor(what.system, program, tolerances, (self.t_start, self.last), y, self.mode)
         return replace(
             self,
             what=what,

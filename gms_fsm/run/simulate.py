@@ -163,7 +163,7 @@ def simulate(
             "it must be a function of the moment reached", place="progress", value=progress
         )
     asked = not isinstance(sensitivities, list | tuple) or len(sensitivities) > 0
-    if asked and isinstance(model, System):
+    if asked:
         refuse_functions(model)  # what they return depends on the numbers, too
     model = controlled(model, end, chosen, t_start=t_start, initial=initial)
     path = None if checkpoint is None else checked_path("checkpoint", checkpoint)
