@@ -172,6 +172,7 @@ def _built(kind: type[Fit], data: dict[str, Any]) -> Fit:
         none,
         np.eye(count),
         nothing,
+        nothing,
         data["correlation_time"],
         data["effective_rows"],
     )

@@ -131,7 +131,7 @@ def test_a_play_bank_is_found_without_a_search() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("smoothing", [0.005, 0.01, 0.02])
+@pytest.mark.parametrize("smoothing", [0.0, 0.002, 0.005, 0.01, 0.02])
 def test_an_inertia_under_a_smoothing_is_covered_or_doubted(smoothing: float) -> None:
     t = np.arange(1000) * 0.005
     w, u = 2.0 * np.pi * 8.0, 2.0 * np.pi * 1.1

@@ -20,7 +20,7 @@ from gms_fsm.identification.certainty.statistics import (
     certainty,
     correlation_time,
 )
-from gms_fsm.identification.problem.experiment import NUISANCE, Experiment, Point
+from gms_fsm.identification.problem.experiment import MASS, NUISANCE, Experiment, Point
 from gms_fsm.identification.problem.runs import LOST, ThreadPool
 from gms_fsm.identification.problem.task import Task, stretches
 from gms_fsm.identification.problem.unknowns import Unknown
@@ -33,6 +33,7 @@ NO_INFLUENCE = "cannot be told: no influence on this record"
 NOT_KNOWN = f"{OPEN}: its interval was not computed"
 AT_BOUND = "at its bound"
 SMOOTHED = "depends on the smoothing of the motion"
+MUCH = 2.0  # rows over which residuals follow each other, without AR(1) noise; chance gives 1.4
 MOST_NAMED = 4  # parameters in one direction
 
 
@@ -193,8 +194,9 @@ def assessed(task: Task, point: Point, pool: ThreadPool) -> Assessed:
             _smoothed(each, entry, half, move)
             for each, entry, half, move in zip(table, entries, halves, shift.tolist(), strict=True)
         )
+    table = tuple(_sampled(each, experiment) if each.name == MASS else each for each in table)
     noise = float(np.sqrt(point.cost / max(point.residual.size, 1)))
-    words = _in_words(table, entries, noise, task)
+    words = _in_words(table, entries, noise, task) + _beyond(sure)
     profiles: tuple[Profile, ...] = ()
     if region is not None:
         profiles = tuple(
@@ -249,6 +251,23 @@ def _smoothed(each: Estimate, entry: _Entry, half: float, shift: float) -> Estim
     return replace(each, low=low, high=high, note=note)
 
 
+def _sampled(each: Estimate, experiment: Experiment) -> Estimate:
+    """Return an inertia whose interval covers what the motion may do between rows.
+
+    Differences of neighbours would give another acceleration: where that matters, rows are few.
+    """
+    courses = [course for course in experiment.courses if course.t.size > 1]
+    spline = np.concatenate([course.acceleration[course.rows] for course in courses])
+    plain = np.concatenate([np.gradient(course.v, course.t)[course.rows] for course in courses])
+    size = float(spline @ spline)
+    doubt = abs(float((plain - spline) @ spline)) / size if size else 0.0
+    if not each.told or doubt * each.value <= 0.5 * (each.high - each.low):
+        return each
+    note = each.note or f"depends on the motion between rows, by about {doubt:.1%}"
+    low, high = each.low - doubt * each.value, each.high + doubt * each.value
+    return replace(each, low=max(low, 0.0), high=high, note=note)
+
+
 def unassessed(task: Task, point: Point) -> Assessed:
     """Return the table of a fit without intervals, for one that was interrupted or needs none."""
     experiment, count = task.fine, len(task.unknowns) + len(task.options.nuisance)
@@ -266,6 +285,7 @@ def unassessed(task: Task, point: Point) -> Assessed:
         np.ones(count, dtype=bool),
         np.eye(count),
         without,
+        np.ones(count),
         tau,
         max(point.residual.size / tau, 1.0),
     )
@@ -288,8 +308,9 @@ def _region(
     directions = {
         name: covariance[places, i] / width[i] for i, name in enumerate(names) if width[i] > 0.0
     }
+    shares = dict(zip(names, sure.share.tolist(), strict=True))
     return walked(
-        experiment, point, directions, root[places], sure.effective, pool, task.options.seed
+        experiment, point, directions, root[places], sure.effective, shares, pool, task.options.seed
     )
 
 
@@ -469,6 +490,16 @@ def _in_words(
         f"{first} The weakest direction: {_and(moves)} "
         f"{'together change' if len(moves) > 1 else 'changes'} the {task.measured.column} by "
         f"{change:.2g} {unit}; the residual is {noise:.2g} {unit} (root mean square)."
+    )
+
+
+def _beyond(sure: Certainty) -> str:
+    """Warn of residuals that follow each other longer than the noise that intervals assume."""
+    if sure.beyond < MUCH:
+        return ""
+    return (
+        " The residuals follow each other longer than noise that decays evenly, so the model lacks "
+        f"something: intervals may be too short by up to {math.sqrt(sure.beyond):.1f} times."
     )
 
 

@@ -14,7 +14,6 @@ from gms_fsm.foundation.arguments import checked_integer, unknown
 from gms_fsm.identification.certainty.assess import Estimate
 from gms_fsm.identification.certainty.profile import LIMIT, Profile
 from gms_fsm.identification.certainty.region import values_of
-from gms_fsm.identification.certainty.statistics import BLOCK
 from gms_fsm.identification.problem.experiment import Experiment, Point
 from gms_fsm.identification.problem.runs import ThreadPool
 from gms_fsm.identification.problem.search import Best, hops, refine
@@ -27,6 +26,7 @@ FACTOR = 0.1  # first step of a profile, relative, where the interval is open
 SHARE = 0.4  # first step as a share of the interval's half width
 MOST_STEPS = 12  # to each side, each twice as long as the one before
 RESTARTS = 4  # hops at each value
+BLOCK = 10.0  # correlation times in a block of residuals that is drawn
 
 
 @dataclass(frozen=True, eq=False)

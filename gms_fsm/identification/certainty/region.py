@@ -63,12 +63,16 @@ class Region:
         Fall of twice the log-likelihood at each.
     lowest : Point
         The point with the lowest cost.
+    shares : mapping of str to float
+        Of the highest rise inside the region, by name: noise that is correlated moves what acts
+        fast less than what acts slowly, on which all effective rows count.
     """
 
     best: dict[str, float]
     met: dict[str, FloatArray]
     rise: FloatArray
     lowest: Point
+    shares: dict[str, float]
 
     @property
     def better(self) -> Point | None:
@@ -77,7 +81,7 @@ class Region:
 
     def reach(self, name: str) -> tuple[float, float]:
         """Return how far a parameter goes below and above its best value inside the region."""
-        inside = self.met[name][self.rise < LIMIT]
+        inside = self.met[name][self.rise < LIMIT * self.shares[name]]
         best = self.best[name]
         return min(float(inside.min()) - best, 0.0), max(float(inside.max()) - best, 0.0)
 
@@ -110,6 +114,7 @@ def walked(
     directions: dict[str, FloatArray],
     shape: FloatArray,
     effective: float,
+    shares: dict[str, float],
     pool: ThreadPool,
     seed: int,
 ) -> Region:
@@ -135,7 +140,10 @@ def walked(
             met.append(values)
             rises.append(rise)
             for walk in walks:  # a point found for one end may be further out for another
-                if rise < LIMIT and walk.side * (values[walk.name] - walk.value) > 0.0:
+                if (
+                    rise < LIMIT * shares[walk.name]
+                    and walk.side * (values[walk.name] - walk.value) > 0.0
+                ):
                     walk.place, walk.value = each.u, values[walk.name]
 
     alone = [
@@ -157,10 +165,11 @@ def walked(
         points = pool.map(experiment.at, places)
         new = [_rise(each, point.cost, rows) for each in points]
         for walk, rise in zip(walks, new, strict=True):
-            walk.step = min(walk.step * (GROWTH if rise < LIMIT else SHRINK), 8.0)
+            inside = rise < LIMIT * shares[walk.name]
+            walk.step = min(walk.step * (GROWTH if inside else SHRINK), 8.0)
         take(points, new)
     columns = {name: np.array([values[name] for values in met]) for name in best}
-    return Region(best, columns, np.array(rises), lowest[-1])
+    return Region(best, columns, np.array(rises), lowest[-1], shares)
 
 
 def _rise(point: Point, lowest: float, rows: float) -> float:

@@ -1,13 +1,12 @@
 """How sure a fit is: correlated residuals, intervals, and directions that are not determined.
 
-Residuals of a model are correlated over many rows, so that rows count for less than their number:
-intervals follow from sums of the slopes over blocks that are nearly independent (a sandwich), not
-from rows.
+Residuals of a model are correlated over many rows, so that rows count for less than their number.
+The intervals are those of least squares under noise whose correlation decays by the same factor
+from row to row, AR(1), estimated by restricted likelihood. Residuals that follow each other longer
+than such noise are measured, so that a fit can warn of them; its intervals are not made wider.
 
 References
 ----------
-W. K. Newey, K. D. West, "A Simple, Positive Semi-Definite, Heteroskedasticity and Autocorrelation
-Consistent Covariance Matrix", Econometrica 55(3), 703-708 (1987), doi:10.2307/1913610.
 A. Sokal, "Monte Carlo Methods in Statistical Mechanics" (1997), for the window of the correlation
 time.
 """
@@ -26,14 +25,14 @@ from scipy.special import stdtrit
 from gms_fsm.charts.parameters import FloatArray
 
 WINDOW = 5.0  # correlation times over which the autocorrelation is summed
-BLOCK = 10.0  # correlation times in a block of the sandwich
-FEWEST_BLOCKS = 12
+ROUNDING = 1e-14  # of the strongest direction: what is below has no influence
 # A direction along which the coordinates can move this far (a factor of e**1.5, or the whole size
 # of the force) within the noise is not determined at all.
 LOOSE = 1.5
 # A parameter whose 95 % interval is wider than this (a factor of 3 either way) cannot be told.
 WIDE = math.log(3.0)
 MOST_CORRELATED = 4.0  # atanh of the correlation from row to row: 0.9993
+LEAST_SHARE = 1e-3  # of the variance that a slow parameter would have
 SHARE = 0.3  # of a direction: what makes a parameter take part in it
 NEGLIGIBLE = 0.02  # of the force: an interval whose whole effect is below this tells "nearly zero"
 
@@ -81,8 +80,12 @@ class Certainty:
         Combinations of the coordinates, from the best determined to the least.
     spread : ndarray, shape (p,)
         How far each can move within the noise (one standard deviation).
+    share : ndarray, shape (p,)
+        Variance of each as a share of that of a slow parameter, for which rows / tau count.
     tau, effective : float
-        Correlation time in rows, and the number of rows that count.
+        Correlation time of the noise in rows, and the number of rows that count.
+    beyond : float
+        Correlation time in rows of what is left without that noise: 1 if nothing follows.
     """
 
     covariance: FloatArray
@@ -90,8 +93,10 @@ class Certainty:
     open: FloatArray
     directions: FloatArray
     spread: FloatArray
+    share: FloatArray
     tau: float
     effective: float
+    beyond: float = 1.0
 
 
 def certainty(
@@ -99,37 +104,26 @@ def certainty(
 ) -> Certainty:
     """Return what the data say, from the slopes of the force and the residuals."""
     rows, p = slopes.shape
-    residual = np.concatenate(list(parts))
-    tau = correlation_time(parts)
-    effective = max(rows / tau, 1.0)
-    variance = float(residual @ residual) / max(rows - p, 1)
-    variance = max(variance, (1e-9 * size) ** 2)
-    information = slopes.T @ slopes / (variance * tau)
-    strength, vectors = np.linalg.eigh(information)
+    strength, vectors = np.linalg.eigh(slopes.T @ slopes)
     order = np.argsort(strength)[::-1]
     strength, vectors = np.maximum(strength[order], 0.0), vectors[:, order]
-    with np.errstate(divide="ignore"):
-        spread = 1.0 / np.sqrt(strength)
+    solid = strength > ROUNDING * strength[:1]
+    own = slopes @ vectors[:, solid]
+    ends = np.cumsum([part.size for part in parts])[:-1]
+    pieces = np.split(np.column_stack([own, np.concatenate(list(parts))]), ends)
+    rho, variance = _decaying_noise(pieces)
+    variance = max(variance, (1e-9 * size) ** 2)
+    tau = (1.0 + rho) / (1.0 - rho)
+    effective = max(rows / tau, 1.0)
+    along = _products(pieces, rho) * variance / np.outer(strength[solid], strength[solid])
+    spread = np.full(p, np.inf)
+    spread[solid] = np.sqrt(np.diag(along))
     loose = spread > LOOSE
     taking = (np.abs(vectors[:, loose]) > SHARE).any(axis=1)
-    kept = vectors[:, ~loose]
-    blocks = _block_sums(slopes @ kept, parts, max(1, math.ceil(BLOCK * tau)))
-    count = len(blocks)
-    inverse = np.diag(spread[~loose] ** 2) / (variance * tau)
-    middle = blocks.T @ blocks * (count / max(count - kept.shape[1], 1))
-    # With few blocks their sums are too uncertain; the information alone is then the better guess.
-    if count < FEWEST_BLOCKS + kept.shape[1]:
-        middle = np.linalg.pinv(inverse) * variance * tau
-    covariance = kept @ inverse @ middle @ inverse @ kept.T
-    # Blocks are few, and fitted residuals are smaller than the noise: never surer than rows / tau,
-    # nor than noise that decays as the residuals do.
-    decaying, correlation = _of_decaying_noise(slopes @ kept, parts)
-    effective = max(min(effective, rows * (1.0 - correlation) / (1.0 + correlation)), 1.0)
-    least = np.einsum("ij,j,ij->i", kept, spread[~loose] ** 2, kept)
-    least = np.maximum(least, np.einsum("ij,jk,ik->i", kept, decaying, kept))
-    present = np.maximum(np.diag(covariance), 1e-300)
-    wider = np.sqrt(np.maximum(least / present, 1.0))
-    covariance = covariance * np.outer(wider, wider)
+    kept = vectors[:, solid] * ~loose[solid]
+    covariance = kept @ along @ kept.T
+    slow = np.einsum("ij,j,ij->i", kept, variance * tau / strength[solid], kept)
+    share = np.clip(np.diag(covariance) / np.maximum(slow, 1e-300), LEAST_SHARE, 1.0)
     degrees = max(effective - p, 3.0)
     half = stdtrit(degrees, 0.975) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     effect = half * np.sqrt(np.einsum("ij,ij->j", slopes, slopes) / rows) / size
@@ -137,21 +131,31 @@ def certainty(
     opened = taking | wide
     np.fill_diagonal(covariance, np.where(taking, np.inf, np.diag(covariance)))
     half = np.where(taking, np.inf, half)
-    return Certainty(covariance, half, opened, vectors, spread, tau, effective)
+    left = [part[1:] - rho * part[:-1] for part in parts if part.size > 1]
+    beyond = correlation_time(left) if left else 1.0
+    return Certainty(
+        covariance,
+        half,
+        opened,
+        vectors,
+        spread,
+        np.where(taking, 1.0, share),
+        tau,
+        effective,
+        beyond,
+    )
 
 
-def _of_decaying_noise(slopes: FloatArray, parts: Sequence[FloatArray]) -> tuple[FloatArray, float]:
-    """Return the covariance of least squares under AR(1) noise, and its correlation by row.
+def _decaying_noise(pieces: Sequence[FloatArray]) -> tuple[float, float]:
+    """Return the correlation by row of AR(1) noise, and its variance; residuals are last columns.
 
     The correlation is that of the restricted likelihood of generalised least squares, which knows
     that a fit has taken a part of the slow noise away; that of the residuals is too small.
     """
-    ends = np.cumsum([part.size for part in parts])[:-1]
-    columns = np.column_stack([slopes, np.concatenate(list(parts))])
-    pieces = np.split(columns, ends)
-    rows, p = slopes.shape
-    if not p or rows <= p + 2 or not columns[:, -1].any():
-        return np.zeros((p, p)), 0.0
+    rows, p = sum(len(piece) for piece in pieces), pieces[0].shape[1] - 1
+    squares = sum(float(piece[:, -1] @ piece[:, -1]) for piece in pieces)
+    if rows <= p + 2 or squares == 0.0:
+        return 0.0, squares / max(rows - p, 1)
 
     def whitened(rho: float) -> FloatArray:
         root = math.sqrt(1.0 - rho * rho)
@@ -161,32 +165,23 @@ def _of_decaying_noise(slopes: FloatArray, parts: Sequence[FloatArray]) -> tuple
         triangle = np.abs(np.diag(np.linalg.qr(whitened(rho), mode="r")))
         left = max(float(triangle[-1]) ** 2, 1e-300)
         fall = 2.0 * float(np.log(np.maximum(triangle[:-1], 1e-300)).sum())
-        return (rows - p) * math.log(left) - len(parts) * math.log(1.0 - rho * rho) + fall, left
+        return (rows - p) * math.log(left) - len(pieces) * math.log(1.0 - rho * rho) + fall, left
 
     found = minimize_scalar(
         lambda x: lack(math.tanh(x))[0], bounds=(0.0, MOST_CORRELATED), method="bounded"
     )
     rho = math.tanh(float(found.x))
-    innovation = lack(rho)[1] / (rows - p)
-    middle = np.zeros((p, p))
+    return rho, lack(rho)[1] / (rows - p) / (1.0 - rho * rho)
+
+
+def _products(pieces: Sequence[FloatArray], rho: float) -> FloatArray:
+    """Return the sum of slope times slope over all pairs of rows, each times their correlation."""
+    middle = np.zeros((pieces[0].shape[1] - 1,) * 2)
     for piece in pieces:
         own = piece[:, :-1]
         carried = lfilter([1.0], [1.0, -rho], own, axis=0)
         middle += own.T @ carried + carried.T @ own - own.T @ own
-    inverse = np.linalg.pinv(slopes.T @ slopes)
-    return inverse @ middle @ inverse * (innovation / (1.0 - rho * rho)), rho
-
-
-def _block_sums(scores: FloatArray, parts: Sequence[FloatArray], length: int) -> FloatArray:
-    """Return the sums of slope times residual over blocks of rows, shape (blocks, p)."""
-    sums = []
-    ends = np.cumsum([part.size for part in parts])[:-1]
-    for part, own in zip(parts, np.split(scores, ends), strict=True):
-        weighted = own * part[:, None]
-        count = max(1, part.size // length)
-        borders = np.linspace(0, part.size, count + 1).astype(int)[:-1]
-        sums.append(np.add.reduceat(weighted, borders, axis=0))
-    return np.concatenate(sums)
+    return middle
 
 
 def phase_floor(t: FloatArray, values: FloatArray, period: float) -> float:
