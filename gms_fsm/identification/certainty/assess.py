@@ -33,7 +33,6 @@ NO_INFLUENCE = "cannot be told: no influence on this record"
 NOT_KNOWN = f"{OPEN}: its interval was not computed"
 AT_BOUND = "at its bound"
 SMOOTHED = "depends on the smoothing of the motion"
-MUCH = 2.0  # rows over which residuals follow each other, without AR(1) noise; chance gives 1.4
 MOST_NAMED = 4  # parameters in one direction
 
 
@@ -120,7 +119,7 @@ class _Entry:
     meaning: str
     value: float
     slopes: FloatArray  # d(force)/d(coordinate)
-    kind: str  # "log", "excess", "linear"
+    kind: str  # "log", "excess", "linear"; "positive" is linear, relative to its value
     scale: float  # d(value)/d(coordinate)
     low: float
     high: float
@@ -148,6 +147,8 @@ class _Entry:
             return half > WIDE
         if half * float(np.sqrt(np.mean(self.slopes**2))) < NEGLIGIBLE * size:
             return False
+        if self.kind == "positive":
+            return half > WIDE
         if self.kind == "excess":
             low, high = low - self.base, high - self.base
         return low <= 0.0 or math.log(high / low) > 2.0 * WIDE
@@ -419,7 +420,7 @@ def _entries(
             unknown.parameter.meaning,
             value,
             column * scale,
-            "log" if positive else "linear",
+            "positive" if positive else "linear",
             scale,
             least,
             math.inf,
@@ -495,11 +496,11 @@ def _in_words(
 
 def _beyond(sure: Certainty) -> str:
     """Warn of residuals that follow each other longer than the noise that intervals assume."""
-    if sure.beyond < MUCH:
+    if sure.beyond <= 1.0:
         return ""
     return (
-        " The residuals follow each other longer than noise that decays evenly, so the model lacks "
-        f"something: intervals may be too short by up to {math.sqrt(sure.beyond):.1f} times."
+        " The residuals follow each other longer than noise that decays evenly: the model lacks "
+        f"something, and intervals may be {math.sqrt(sure.beyond):.1f} times too short."
     )
 
 

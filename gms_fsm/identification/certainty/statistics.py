@@ -32,6 +32,8 @@ LOOSE = 1.5
 # A parameter whose 95 % interval is wider than this (a factor of 3 either way) cannot be told.
 WIDE = math.log(3.0)
 MOST_CORRELATED = 4.0  # atanh of the correlation from row to row: 0.9993
+LONGER = 1.5  # correlation time of what is left, from which it matters
+CHANCE = 14.0  # times 1/sqrt(rows): three deviations of a correlation time of 1
 LEAST_SHARE = 1e-3  # of the variance that a slow parameter would have
 SHARE = 0.3  # of a direction: what makes a parameter take part in it
 NEGLIGIBLE = 0.02  # of the force: an interval whose whole effect is below this tells "nearly zero"
@@ -85,7 +87,7 @@ class Certainty:
     tau, effective : float
         Correlation time of the noise in rows, and the number of rows that count.
     beyond : float
-        Correlation time in rows of what is left without that noise: 1 if nothing follows.
+        Correlation time in rows of what is left without that noise: 1 if that may be chance.
     """
 
     covariance: FloatArray
@@ -133,6 +135,8 @@ def certainty(
     half = np.where(taking, np.inf, half)
     left = [part[1:] - rho * part[:-1] for part in parts if part.size > 1]
     beyond = correlation_time(left) if left else 1.0
+    if beyond <= max(LONGER, 1.0 + CHANCE / math.sqrt(rows)):
+        beyond = 1.0
     return Certainty(
         covariance,
         half,
