@@ -3362,7 +3362,6 @@ rows = {repr(signal): (signal,) for signal in WRONG} | {
     "ramps to it": ([(0, HUGE), (1, 0)],),
     "a record of it": (([0, 1], [0, -HUGE]),),
     "very many words": (["x"] * 100_000,),
-    "a record": (Record.from_arrays(time=range(5), position=range(5)),),
 }
 group("signal", SignalError, Prescribed, rows, "signal")
 rows = {
@@ -3668,7 +3667,7 @@ rows = {
     "NaN below a row left out": ({10: "0.08,lost,1", 15: "0.13,1,nan"}, HOLE),
     "unit of another column": ({2: "s,m,N"},),
     "unit of the time": ({2: "ms,mm,N"},),
-    "gap at an end": ({2: "0,0,"}, "", "interpolate"),
+    "gap at an end": ({2: "0,,0"}, "", "interpolate"),
     "gap in time": ({7: ",1,1"}, "", "interpolate"),
     "header below the table": ({}, "", "error", 2000),
     "header that is a row": ({2: "t,x,F"},),

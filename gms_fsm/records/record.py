@@ -369,7 +369,7 @@ class Record:
         --------
         >>> Record.from_arrays(time=[0, 1, 2, 3, 3], position=[0, 1, 2, 3, 4])
         Traceback (most recent call last):
-        gms_fsm.errors.RecordError: record 'arrays': time does not increase after index 3 (index 3: 3.0 s, next: 3.0 s); sort the rows and remove duplicates
+        gms_fsm.errors.RecordError: record 'arrays': time does not increase after index 3 (index 3: 3.0 s, next: 3.0 s); sort the rows and remove duplicates, or give sort = true, duplicates = "mean"
         """  # noqa: E501 (a message is one line)
         given = {"time": time, "position": position, "velocity": velocity}
         given |= {"force": force, "normal": normal}

@@ -10,7 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from gms_fsm import Record
 from gms_fsm.errors import RecordError
-from gms_fsm.foundation.quantities import UNITS, convert_numbers, factor
+from gms_fsm.foundation.quantities import COLUMN_UNITS, convert_numbers, factor
 from gms_fsm.records.motion import Motion, motion_of
 from gms_fsm.records.record import Column
 from tests.scenario_files import MEASURED, CommandLine, changed, read_table, table
@@ -47,15 +47,19 @@ EXPECTED["force"] |= {"lbf": 4.4482216152605}
 EXPECTED["position"] |= {"rad": 1, "mrad": 1e-3, "deg": np.pi / 180, "°": np.pi / 180}
 EXPECTED["velocity"] |= {"rad/s": 1, "mrad/s": 1e-3, "deg/s": np.pi / 180, "rpm": np.pi / 30}
 EXPECTED["force"] |= {"Nm": 1, "kNm": 1e3, "mNm": 1e-3, "mN·m": 1e-3}
+EXPECTED["position"] |= {"urad": 1e-6, "nrad": 1e-9}
+EXPECTED["velocity"] |= {"urad/s": 1e-6, "nrad/s": 1e-9}
+EXPECTED["force"] |= {"uNm": 1e-6}
 EXPECTED["normal"] = EXPECTED["force"]
 
 
 @pytest.mark.parametrize("quantity", EXPECTED)
 def test_every_unit_reads_as_its_si_value(quantity: str, tmp_path: Path) -> None:
-    assert set(UNITS.get(quantity, ())) <= set(EXPECTED[quantity])
+    assert set(COLUMN_UNITS.get(quantity, ())) <= set(EXPECTED[quantity])
     values = np.arange(1.0, 7.0)
     for unit, size in EXPECTED[quantity].items():
-        assert factor(quantity, unit) == factor(quantity, f" {unit} ") == size
+        for spelt in (unit, f" {unit} "):
+            assert factor(quantity, spelt, COLUMN_UNITS) == size
         columns = {"time": Column("t", "s"), quantity: Column("a", unit, sign=-1)}
         if quantity == "time":
             columns = {quantity: Column("a", unit)}
