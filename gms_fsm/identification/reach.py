@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.foundation.quantities import in_words
+from gms_fsm.identification.certainty.statistics import correlation_time
 from gms_fsm.identification.problem.beginning import estimated
 from gms_fsm.identification.problem.experiment import Experiment
 from gms_fsm.identification.problem.runs import AT_REST, Course
-from gms_fsm.identification.problem.task import at_all_rows
+from gms_fsm.identification.problem.task import at_all_rows, stretches
 from gms_fsm.records.record import Record
 from gms_fsm.systems.mounted import Mounted
 
@@ -93,7 +94,7 @@ def predicted(fit: Fit, record: Record, initial: Any, lead: float) -> FloatArray
     """Return what a fit gives for a record; see `gms_fsm.Fit.predict`."""
     along, fine = fit.task.along(record, None), fit.task.fine
     if initial == "estimate":
-        tau = fit.correlation_time
+        tau = correlation_time(stretches(fit.task.courses, fit.point.residual))
         along = [each.begun(estimated(fine, fit.point, each, lead, tau)) for each in along]
     elif initial is not None:
         checked_kind("initial", initial, Mapping, "'estimate', or a mapping such as {'z': 0}")

@@ -115,7 +115,7 @@ class Fit:
 
     @property
     def correlation_time(self) -> float:
-        """Rows over which residuals are correlated."""
+        """Correlation time of the noise in rows, if it is AR(1): ``(1 + rho) / (1 - rho)``."""
         return self.assessed.certainty.tau
 
     @property
