@@ -569,8 +569,9 @@ def _notes(task: Task, silent: Sequence[str]) -> tuple[str, ...]:
         )
     else:
         notes.append("each record begins with the initial state of the chart")
-    for record in task.records:
-        if task.measured.column == "force" and _follows_position(record):
+    # One record of several may be a spring, which does not slip.
+    if task.measured.column == "force" and all(_follows_position(each) for each in task.records):
+        for record in task.records:
             told = (
                 f"{record.place}: the force has the sign of the position, as friction has that of "
                 "a velocity; if the column is a velocity, give velocity= in place of position="

@@ -160,8 +160,8 @@ def test_candidates_and_an_interruption_are_said(tmp_path: Path) -> None:
     stopped = "The search was interrupted: this is the best so far."
     chosen = replace(small(), choice=Choice(rows, "two"), stopped=stopped)
     page = write_report(chosen, tmp_path).read_text(encoding="utf-8")
-    assert "| one | simple | 3 | 0.1 | 0.9900 | -5 | 1 |  |" in page
-    assert "| **two** | simple | 3 | 0.1 | 0.9900 | -5 | 1 |  |" in page
+    assert "| one | simple | 3 | 0.1 | 0.9900 | -5 | – | – | 1 |  |" in page
+    assert "| **two** | simple | 3 | 0.1 | 0.9900 | -5 | – | – | 1 |  |" in page
     assert page.splitlines()[2] == f"**{stopped}**"
 
 

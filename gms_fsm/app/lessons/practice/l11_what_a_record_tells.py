@@ -45,7 +45,7 @@ well, ten times the truth changes the force by {unseen:g} N. On the designed mot
 weights2 is known to ±{wide!p:.2g} %.
 
 Measured: with noise that is correlated by {CORRELATION:g} from row to row, {rows} rows count for
-{correlated.effective_rows:.0f}; intervals from rows are {too_short:.1f} times shorter. Of
+{correlated.effective_rows:.0f}; intervals from rows are up to {too_short:.1f} times too short. Of
 {REPEATED} such records (linearised) they contain the truth in {coverage[0]!p:.0f} %, those from
 effective rows in {coverage[1]!p:.3g} %. With F_c and F_s free, too, two fits find {pairs}: products
 of {thresholds} µm. They say: {weakest}.
@@ -58,8 +58,8 @@ one factor of each product, and design the motion before measuring.
 An element slips once it is deflected by its threshold. With ±160 µm the second element is a spring:
 every threshold above 160 µm gives the same force, and the fit returns the value at which it began.
 
-n rows count for n (1 - 0.95)/(1 + 0.95), about 1 in 39; intervals are therefore √39 = 6.2 times
-longer. A fit estimates the correlation from its residuals, so that its factor scatters around that.
+n rows count for n (1 - 0.95)/(1 + 0.95), about 1 in 39; intervals are therefore up to √39 =
+6.2 times longer. A fit estimates the correlation from its residuals: its factor scatters around it.
 
 Every threshold is w s(v). With twice the curve s(v) and half the weights w nothing changes, so that
 the ratio of the two values of F_c is that of the starts: both may move by the same factor, but
@@ -197,7 +197,7 @@ def run() -> dict[str, Any]:
     # Half intervals, relative: as if rows were independent, and as the table gives them.
     from_rows = SURE * correlated.training["rmse"] * unit
     from_effective = np.array([_half(correlated, name) for name in NAMES])
-    too_short = np.median(from_effective / from_rows)
+    too_short = np.sqrt(correlated.training["rows"] / correlated.effective_rows)
     coverage = _coverage(slopes, unit)
 
     free = ("k", "weights", "F_c", "F_s")
