@@ -24,12 +24,14 @@ from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
+from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.trace import Trace
 
 __all__ = ["LimitCycle", "limit_cycle"]
 
 MOST_ITERATIONS = 15
 RESIDUAL = 1e-10  # of the size of each component
+AT_REST = 1e-6  # of the sizes: what moves by less in a period stands still
 INVARIANT = 1e-7  # a rate that changes by less does not change
 PERIODS = 30  # that a driven system runs before the search, if nothing near is given
 SAMPLES = 60  # rows at which it is asked what the motion depends on
@@ -219,9 +221,17 @@ class _Search:
         size = y.size
         names = tuple(f"{INITIAL}{k}" for k in range(size))
         every = Directions(names, {}, {}, np.eye(size), np.maximum(self.sizes, 1e-12))
+        back: tuple[FloatArray, float] | None = None  # half the last step, the other way
         for iteration in range(1, MOST_ITERATIONS + 1):
             start = self.problem(y, period)
-            trace = simulated(start)
+            try:
+                trace = simulated(start)
+            except SimulationError:
+                if back is None:
+                    raise
+                y, period = y + back[0], period + back[1]
+                back = 0.5 * back[0], 0.5 * back[1]
+                continue
             M = derived(start, every, trace).followed.end
             end = np.array(trace.rows.y[-1])
             moved = np.zeros(size) if drift is None else drift * period
@@ -239,6 +249,12 @@ class _Search:
             f = self.rate(start) - (0.0 if drift is None else drift)
             along = Q.T @ (f / self.sizes)
             if same and (residual < RESIDUAL or (residual < 1e3 * RESIDUAL and residual >= before)):
+                if drift is not None and float(np.abs(along).max(initial=0.0)) * period < AT_REST:
+                    raise ParameterError(
+                        "Newton's method ends where nothing moves, which is no cycle",
+                        place="near",
+                        advice="give a longer run that ends closer to the cycle",
+                    )
                 return LimitCycle(
                     period,
                     _multipliers(A, along if drift is not None else None),
@@ -249,8 +265,8 @@ class _Search:
                     y,
                 )
             step, dT = _newton(A, R, along if drift is not None else None)
-            y = y + self.sizes * (Q @ step)
-            period += dT
+            moves = self.sizes * (Q @ step)
+            y, period, back = y + moves, period + dT, (-0.5 * moves, -0.5 * dT)
             if not (0.2 * self.period < period < 5.0 * self.period):
                 break
         raise ParameterError(

@@ -36,6 +36,7 @@ ALIKE = 1e-7  # times of switches that differ by less have one derivative
 ROUNDING = 1e-12  # of the length of a run
 SHORT = 64.0  # ticks: an arc that a switch has ended at once
 NOTHING = 1e-9  # of the natural size of a margin's derivative
+BACK = 1e-8  # of the last step: just before a switch
 GRAZING = 1e-4  # of the mean rate of a margin over its last step
 
 
@@ -409,11 +410,18 @@ class Follower:
         S: FloatArray,
         t_t: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return for each relation how its zero moves, shape (relations, directions); its rate."""
+        """Return for each relation how its zero moves, shape (relations, directions); its rate.
+
+        What is flat behind its zero, as max(N, 0), is taken from just before it.
+        """
         places = [self.place(r) for r in relations]
-        _, g_t = self.linear.margins(
-            places, self.t, y, mode, held, np.append(t_t, 1.0), np.column_stack([S, f])
-        )
+        t, columns = np.append(t_t, 1.0), np.column_stack([S, f])
+        _, g_t = self.linear.margins(places, self.t, y, mode, held, t, columns)
+        flat = g_t[:, -1] == 0.0
+        back = max(BACK * (self.t - self.before[0]), SHORT * tick_at(self.t))
+        if flat.any() and back < self.t - self.settled[0]:
+            earlier, y = self.t - back, (np.array(y) - back * f).tolist()
+            g_t[flat] = self.linear.margins(places, earlier, y, mode, held, t, columns)[1][flat]
         with np.errstate(all="ignore"):
             moved = -g_t[:, :-1] / g_t[:, -1:]
         moved[g_t[:, :-1] == 0.0] = 0.0

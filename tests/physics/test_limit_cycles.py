@@ -9,6 +9,7 @@ import pytest
 
 from gms_fsm import Belt, Body, ChartModel, Contact, PulledSlider, System, limit_cycle, simulate
 from gms_fsm.charts import CHARTS
+from gms_fsm.errors import ParameterError
 from tests.helpers import FASTEST, pulled_mass
 
 pytestmark = pytest.mark.slow
@@ -99,3 +100,11 @@ def test_a_driven_motion_keeps_the_period_it_is_given():
     assert cycle.stable
     x = cycle.trace.body("mass").x
     assert abs(x[-1] - x[0]) < 1e-9 * np.abs(x).max()
+
+
+def test_a_state_of_rest_is_no_cycle():
+    pad = ChartModel(CHARTS["stiction"], {"F_c": F_C, "F_s": F_S, "b": 0.1})
+    near = simulate(pad, Belt(M, K, 2.0), 20.0, initial={"x": 0.9}, engine=FASTEST)
+    assert len(near.transitions) == 0
+    with pytest.raises(ParameterError, match="nothing moves"):
+        limit_cycle(pad, Belt(M, K, 2.0), near=near, period=4.44)

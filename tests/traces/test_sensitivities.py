@@ -12,7 +12,7 @@ from gms_fsm.traces.trace import Trace
 from tests.helpers import pulled_mass, stick_slip
 
 
-def touching(height: float) -> Trace:
+def touching(height: float, guard: str = "z > h") -> Trace:
     """A variable that rises to 0.5 at t = 1, and a guard at some height."""
     chart = Chart(
         "touches",
@@ -20,7 +20,7 @@ def touching(height: float) -> Trace:
         variables=("z",),
         parameters=("h", "k"),
         states=(State("below", flow={"z": "v"}), State("above", flow={"z": "2 * v"})),
-        transitions=(Transition("reach", "below", "above", guard="z > h"),),
+        transitions=(Transition("reach", "below", "above", guard=guard),),
         outputs={"F": "k * z"},
     )
     model = ChartModel(chart, {"h": height, "k": 2.0})
@@ -38,6 +38,15 @@ def test_a_crossing_has_the_derivative_of_its_root():
     assert trace.sensitivity("z", "h")[-1] == pytest.approx([-1.0])
     assert trace.sensitivity("z", "initial.z")[-1] == pytest.approx([2.0])
     assert trace.sensitivity("F", "k")[-1] == pytest.approx(trace.z[-1, 0])
+
+
+@pytest.mark.parametrize("guard", ["max(h - z, 0) <= 0", "max(z - h, 0) > 0"])
+def test_what_is_flat_on_one_side_of_its_zero_has_the_derivative_of_the_other(guard):
+    trace, plain = touching(0.375, guard), touching(0.375)
+    for of, to in (("transitions", "h"), ("z", "initial.z")):
+        one, other = (each.sensitivity(of, to)[-1] for each in (trace, plain))
+        assert one == pytest.approx(other, rel=1e-7)
+    assert trace.trust().of("sensitivity") == ()
 
 
 def test_a_grazing_switch_has_none_and_says_so():
