@@ -70,6 +70,42 @@ def test_elements_that_switch_by_one_guard_on_v_have_a_derivative():
     assert trace.trust().of("sensitivity") == ()
 
 
+def in_turn(**values: float) -> Trace:
+    """Two guards at one height; whichever comes first decides what the other one leads to."""
+    chart = Chart(
+        "in turn",
+        inputs=("v",),
+        variables=("z",),
+        parameters=("h", "g"),
+        states=tuple(
+            State(name, flow={"z": f"{rate} * v"})
+            for name, rate in (("low", 1), ("after h", 2), ("after g", 5), ("both", 3))
+        ),
+        transitions=(
+            Transition("h", "low", "after h", guard="z > h"),
+            Transition("g", "low", "after g", guard="z > g"),
+            Transition("g then", "after h", "both", guard="z > g"),
+            Transition("h then", "after g", "both", guard="z > h"),
+        ),
+        outputs={"F": "z"},
+    )
+    model = ChartModel(chart, {"h": 1.0, "g": 1.0} | values)
+    return simulate(model, Prescribed("t"), 2.0, rtol=1e-12, sensitivities=("h", "g"))
+
+
+@pytest.mark.parametrize(("name", "side"), [("h", -1e-6), ("g", 1e-6)])
+def test_a_tie_that_does_not_commute_has_the_derivative_of_the_side_it_went(name, side):
+    trace, beside, beyond = in_turn(), in_turn(**{name: 1 + side}), in_turn(**{name: 1 - side})
+    (found,) = trace.trust().of("sensitivity")
+    assert "follow each other as they did" in found.text
+    slope = trace.sensitivity("z", name)[-1]
+    assert slope == pytest.approx((beside.z[-1] - trace.z[-1]) / side, rel=1e-5)
+    assert abs((beyond.z[-1] - trace.z[-1]) / -side - slope) > 1.0
+    times = trace.sensitivity("transitions", name)
+    moved = (beside.transitions.t - trace.transitions.t) / side
+    np.testing.assert_allclose(times, moved, rtol=1e-5, atol=1e-8)
+
+
 def test_requested_rows_have_the_derivatives_of_all_rows():
     model, rig = pulled_mass()
     names = ("F_s", "initial.v")
