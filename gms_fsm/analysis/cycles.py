@@ -248,13 +248,13 @@ class _Search:
                 )
             f = self.rate(start) - (0.0 if drift is None else drift)
             along = Q.T @ (f / self.sizes)
+            if drift is not None and np.abs(along).max(initial=0.0) * period < AT_REST:
+                raise ParameterError(
+                    "Newton's method ends where nothing moves, which is no cycle",
+                    place="near",
+                    advice="give a longer run that ends closer to the cycle",
+                )
             if same and (residual < RESIDUAL or (residual < 1e3 * RESIDUAL and residual >= before)):
-                if drift is not None and float(np.abs(along).max(initial=0.0)) * period < AT_REST:
-                    raise ParameterError(
-                        "Newton's method ends where nothing moves, which is no cycle",
-                        place="near",
-                        advice="give a longer run that ends closer to the cycle",
-                    )
                 return LimitCycle(
                     period,
                     _multipliers(A, along if drift is not None else None),

@@ -79,13 +79,13 @@ def in_turn(**values: float) -> Trace:
         parameters=("h", "g"),
         states=tuple(
             State(name, flow={"z": f"{rate} * v"})
-            for name, rate in (("low", 1), ("after h", 2), ("after g", 5), ("both", 3))
+            for name, rate in (("low", 1), ("after_h", 2), ("after_g", 5), ("both", 3))
         ),
         transitions=(
-            Transition("h", "low", "after h", guard="z > h"),
-            Transition("g", "low", "after g", guard="z > g"),
-            Transition("g then", "after h", "both", guard="z > g"),
-            Transition("h then", "after g", "both", guard="z > h"),
+            Transition("h_first", "low", "after_h", guard="z > h"),
+            Transition("g_first", "low", "after_g", guard="z > g"),
+            Transition("g_then", "after_h", "both", guard="z > g"),
+            Transition("h_then", "after_g", "both", guard="z > h"),
         ),
         outputs={"F": "z"},
     )
