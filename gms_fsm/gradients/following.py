@@ -47,11 +47,11 @@ class DerivativeDoubt:
     Parameters
     ----------
     kind : str
-        ``"grazing"`` or ``"tie"``.
+        ``"grazing"``, ``"tie"``, or ``"none"`` where a rate has no slope.
     t : float
         s.
     place : str
-        The comparisons that changed there.
+        What happens there.
     reason : str
         What follows.
     """
@@ -313,6 +313,13 @@ class Follower:
         self.size = np.maximum(self.size, np.abs(np.array([self.y, *states])).max(axis=0))
         table = self.arcs.integrate(*self.arc, t, [nodes[u] for u in t], self.S, self.size)
         places = {u: place for place, u in enumerate(t)}
+        known = np.isfinite(table).all(axis=(1, 2))
+        if known[0] and not known[-1]:
+            first = t[int(np.argmin(known))]
+            reason = "nothing has a derivative from then on"
+            self.doubts.append(
+                DerivativeDoubt("none", first, "the slope of a rate is not finite", reason)
+            )
         for u in kept:
             self.keep(u, table[places[u]])
         self.before = ([self.t, *times][-2], [self.y, *states][-2])
@@ -489,7 +496,7 @@ class Follower:
                 name = names[int(np.argmax(slow))]
                 why = "grazes" if rates[slow].any() else "jumps"
                 reason = f"it {why} there, so that nothing has a derivative from then on"
-                self.doubts.append(DerivativeDoubt("grazing", c.t, name, reason))
+                self.doubts.append(DerivativeDoubt("grazing", c.t, f"{name} changes", reason))
                 t_t[:] = np.nan
         apart = np.ptp(t_t, axis=0) if len(t_t) else np.zeros(0)
         least = ROUNDING * (self.last - self.start[0]) / self.directions.scales
@@ -498,7 +505,7 @@ class Follower:
                 DerivativeDoubt(
                     "tie",
                     c.t,
-                    " and ".join(dict.fromkeys(names)),
+                    f"{' and '.join(dict.fromkeys(names))} changes",
                     "they hold on the side on which these follow each other as they did",
                 )
             )

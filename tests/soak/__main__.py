@@ -210,11 +210,12 @@ PARTS = (
     "doubts",
     "verdicts",
     "pairs",
+    "gradients",
 )
 COUNTS = {
     "kills": 200, "examples": 300, "transitions": 1_000_000, "trials": 2000, "records": 1000,
     "systems": 500, "stepped": 200, "exact": 1000, "doubts": 400, "verdicts": 400,
-    "pairs": 1000,
+    "pairs": 1000, "gradients": 100,
 }  # fmt: skip
 
 
@@ -251,6 +252,7 @@ def main() -> None:
         "doubts": ("tests.soak.doubts", str(given.doubts)),
         "verdicts": ("tests.soak.verdicts", str(given.verdicts)),
         "pairs": ("tests.soak.pairs", str(given.pairs)),
+        "gradients": ("tests.soak.gradients", str(given.gradients)),
     }
     none_differs = f"0 of {given.records} differ"
 

@@ -7,7 +7,17 @@ import pickle
 import numpy as np
 import pytest
 
-from gms_fsm import Chart, ChartModel, Prescribed, State, Transition, simulate
+from gms_fsm import (
+    Chart,
+    ChartModel,
+    LuGre,
+    Prescribed,
+    PulledSlider,
+    State,
+    Stribeck,
+    Transition,
+    simulate,
+)
 from gms_fsm.traces.trace import Trace
 from tests.helpers import pulled_mass, stick_slip
 
@@ -57,6 +67,16 @@ def test_a_grazing_switch_has_none_and_says_so():
     assert found.severity == "warning"
     assert found.t == pytest.approx(1.0, abs=1e-5)
     assert "z > h" in found.text
+
+
+def test_a_rate_whose_slope_is_infinite_is_found():
+    curve = Stribeck(1.0, 1.5, 0.1, delta=0.7)
+    model = LuGre(sigma_0=1e3, sigma_1=10.0, sigma_2=0.4, stribeck=curve)
+    trace = simulate(model, PulledSlider(1.0, 2.0, 0.1), 0.5, sensitivities=("stiffness",))
+    assert np.isnan(trace.sensitivity("z", "stiffness")[-1]).all()
+    (found,) = trace.trust().of("sensitivity")
+    assert found.severity == "warning"
+    assert "slope" in found.text
 
 
 def test_elements_that_switch_by_one_guard_on_v_have_a_derivative():

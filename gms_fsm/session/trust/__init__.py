@@ -68,6 +68,6 @@ def _findings(trace: Trace, *, at_times: bool) -> Iterator[Doubt]:
 def _derivatives(trace: Trace) -> Iterator[Doubt]:
     """Yield the switches where derivatives are one-sided, or end."""
     for each in () if trace.derived is None else trace.derived.followed.doubts:
-        text = f"derivatives at t = {each.t:.9g} s, where {each.place} changes: {each.reason}"
-        severity: Severity = "warning" if each.kind == "grazing" else "note"
+        text = f"derivatives at t = {each.t:.9g} s, where {each.place}: {each.reason}"
+        severity: Severity = "note" if each.kind == "tie" else "warning"
         yield Doubt("sensitivity", severity, text, (each.t,))
