@@ -78,7 +78,7 @@ from gms_fsm import (
     sweep,
 )
 from gms_fsm.app.cli import CliOptions, app
-from gms_fsm.app.scenario import launched, load_system
+from gms_fsm.app.scenario import launched, load_scenario, load_system
 from gms_fsm.charts import CHARTS, gms_element, timetable
 from gms_fsm.charts.registry import Demonstration, Entry, entry
 from gms_fsm.debugger.dap._adapter import Adapter
@@ -2161,6 +2161,20 @@ rows = {
         "near",
         ...,
         lambda: limit_cycle(*pulled_mass(), near=simulate(*pulled_mass(), 0.1)),
+    ),
+    "cycle through a section not crossed": (
+        "section",
+        "v < -1",
+        lambda: limit_cycle(*pulled_mass(), near=simulate(*pulled_mass(), 9.0), section="v < -1"),
+    ),
+    "cycle of what is sampled": (
+        "period",
+        0.0015,
+        lambda: limit_cycle(
+            *load_scenario("servo", []).subject[:1],
+            near=simulate(*load_scenario("servo", []).subject[:1], 0.01),
+            period=0.0015,
+        ),
     ),
     "cycle of what is driven": (
         "period",

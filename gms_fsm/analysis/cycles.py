@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
-from gms_fsm.errors import ParameterError
+from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.foundation.extras import has_machine_code
 from gms_fsm.gradients.directions import INITIAL
@@ -20,6 +20,7 @@ from gms_fsm.lowering.observing import armed
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import derived, simulated
+from gms_fsm.run.ticks import clocks_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted, mounted
 from gms_fsm.systems.rigs import Rig
@@ -97,6 +98,7 @@ def limit_cycle(
     *,
     near: Trace | None = None,
     period: float | None = None,
+    section: str | None = None,
     initial: Mapping[str, Any] | None = None,
     settings: Settings | None = None,
     **options: Unpack[SettingOptions],
@@ -115,6 +117,10 @@ def limit_cycle(
     period : float, optional
         s: that of what drives the system, or that of the cycle if this shows a multiple of it. Of a
         system that nothing drives the period is found; this is where to begin.
+    section : str, optional
+        Where the cycle begins: a condition that becomes true once a period, such as "v > 0". Its
+        names are those of `until` in `simulate`. Without it the cycle begins within its longest
+        arc, and a return is looked for among switches.
     initial : mapping, optional
         Initial values of the run without `near`.
     settings : Settings, optional
@@ -162,7 +168,7 @@ def limit_cycle(
         start = Problem.on(what, PERIODS * period, chosen, initial=initial)
         near = simulated(start)
     checked_kind("near", near, Trace, "a trace")
-    search = _Search.of(what, near, chosen, period)
+    search = _Search.of(what, near, chosen, period, section)
     return search.cycle()
 
 
@@ -184,9 +190,17 @@ class _Search:
     sizes: FloatArray
     basis: FloatArray  # of all components on which something depends, shape (m, kept)
     drift: FloatArray | None  # None if the period is given by what drives the system
+    section: str | None
 
     @classmethod
-    def of(cls, what: Mounted, near: Trace, chosen: Settings, period: float | None) -> _Search:
+    def of(
+        cls,
+        what: Mounted,
+        near: Trace,
+        chosen: Settings,
+        period: float | None,
+        section: str | None,
+    ) -> _Search:
         """Return where to begin."""
         whole = near.whole()
         basis, drift = _dependence(whole)
@@ -197,8 +211,22 @@ class _Search:
                 advice="give the period of that",
             )
         sizes = np.maximum(np.abs(whole.rows.y).max(axis=0), 1e-300)
+        if clocks := clocks_of(what.system):
+            drift = None
+            if period is None or any(_is_broken(period / each.period) for each in clocks):
+                raise ParameterError(
+                    "samples drive the system, and a cycle has a whole number of them",
+                    place="period",
+                    value=period,
+                    advice=f"give the period, a multiple of {clocks[0].period:g} s",
+                )
         span, first = period, -1
-        if drift is not None:
+        if section is not None and period is None:
+            most = float(near.t[-1] - near.t[0])
+            there = _crossing(what, near, chosen, section, most)
+            whole = _crossing(what, there, chosen, section, most).whole()
+            span = float(whole.t[-1] - whole.t[0])
+        elif drift is not None:
             span, first = _return(whole, drift, basis, sizes, period)
         assert span is not None
         begin = float(whole.t[first]) if first >= 0 else max(whole.t[0], whole.t[-1] - span)
@@ -206,7 +234,7 @@ class _Search:
         count = near.program.layout.n
         t, y = float(whole.t[row]), np.array(whole.rows.y[row])
         mode = whole.rows.mode[row, :count].tolist()
-        return cls(what, chosen, near.initial or {}, t, span, y, mode, sizes, basis, drift)
+        return cls(what, chosen, near.initial or {}, t, span, y, mode, sizes, basis, drift, section)
 
     def problem(self, y: FloatArray, period: float) -> Problem:
         """Return one period as a run."""
@@ -255,15 +283,12 @@ class _Search:
                     advice="give a longer run that ends closer to the cycle",
                 )
             if same and (residual < RESIDUAL or (residual < 1e3 * RESIDUAL and residual >= before)):
-                return LimitCycle(
-                    period,
-                    _multipliers(A, along if drift is not None else None),
-                    trace,
-                    residual,
-                    iteration,
-                    drift is None,
-                    y,
-                )
+                multipliers = _multipliers(A, along if drift is not None else None)
+                if self.section is not None:  # the same from there on
+                    there = _crossing(self.what, trace, self.chosen, self.section, 2.0 * period)
+                    trace = simulated(_onward(self.what, there, self.chosen, period))
+                    y = np.array(trace.rows.y[0])
+                return LimitCycle(period, multipliers, trace, residual, iteration, drift is None, y)
             step, dT = _newton(A, R, along if drift is not None else None)
             moves = self.sizes * (Q @ step)
             y, period, back = y + moves, period + dT, (-0.5 * moves, -0.5 * dT)
@@ -284,6 +309,34 @@ class _Search:
         held = armed(program, start.t_start, start.y, mode)
         program.ieee["flow"](start.t_start, start.y, list(mode), held, program.p, dy)
         return np.array(dy)
+
+
+def _is_broken(number: float) -> bool:
+    return abs(number - round(number)) > 1e-9 * number
+
+
+def _onward(what: Mounted, trace: Trace, chosen: Settings, span: float) -> Problem:
+    """Return the start of a run from the end of another one."""
+    rows, t, count = trace.whole().rows, float(trace.t[-1]), trace.program.layout.n
+    start = Problem.on(what, t + span, chosen, t_start=t, initial=trace.initial or {})
+    return replace(start, y=rows.y[-1].tolist(), mode=rows.mode[-1, :count].tolist())
+
+
+def _crossing(what: Mounted, near: Trace, chosen: Settings, section: str, most: float) -> Trace:
+    """Go on until the section is crossed."""
+    start = _onward(what, near, chosen, most)
+    try:
+        found = simulated(start, section)
+    except (ExpressionError, ParameterError) as error:
+        raise error.replaced(place="section") from None
+    if found.t[-1] >= start.t_end:
+        raise ParameterError(
+            "it does not become true in the time of the run near the cycle",
+            place="section",
+            value=section,
+            advice="give a condition that the motion crosses once a period, or a longer run",
+        )
+    return found
 
 
 def _newton(A: FloatArray, R: FloatArray, along: FloatArray | None) -> tuple[FloatArray, float]:

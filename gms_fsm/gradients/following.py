@@ -313,7 +313,7 @@ class Follower:
         self.size = np.maximum(self.size, np.abs(np.array([self.y, *states])).max(axis=0))
         table = self.arcs.integrate(*self.arc, t, [nodes[u] for u in t], self.S, self.size)
         places = {u: place for place, u in enumerate(t)}
-        known = np.isfinite(table).all(axis=(1, 2))
+        known: Any = np.isfinite(table).all(axis=(1, 2))
         if known[0] and not known[-1]:
             first = t[int(np.argmin(known))]
             reason = "nothing has a derivative from then on"

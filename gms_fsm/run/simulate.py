@@ -209,12 +209,15 @@ def simulate(
     return watched(trace, watching) if watching else trace
 
 
-def simulated(start: Problem) -> Trace:
-    """Run a problem as it stands."""
+def simulated(start: Problem, until: str | None = None) -> Trace:
+    """Run a problem as it stands, to its end or until a condition becomes true."""
+    stop = None if until is None else Until.of(start, until)
+    start = start if stop is None else stop.start
     run = CompiledRun(start, None) if start.chosen.engine == "compiled" else Run(start)
-    while run.advance():
+    while run.advance() and not (stop and stop.over(run.recorder)):
         pass
-    return run.recorder.trace()
+    found = run.recorder.trace()
+    return found if stop is None else stop.trace(found)
 
 
 def derived(start: Problem, directions: Directions, trace: Trace) -> Sensitivities:

@@ -107,3 +107,14 @@ def test_a_state_of_rest_is_no_cycle():
     near = simulate(pad, Belt(M, K, 2.0), 700.0, engine=FASTEST)
     with pytest.raises(ParameterError, match="nothing moves"):
         limit_cycle(pad, Belt(M, K, 2.0), near=near, period=4.44)
+
+
+@pytest.mark.parametrize("section", ["v > -0.05", "v < -0.1", "v < 0"])
+def test_a_section_says_where_a_cycle_begins(section):
+    near = simulate(PAD, Belt(M, K, V), 40.0, engine=FASTEST)
+    cycle = limit_cycle(PAD, Belt(M, K, V), near=near, section=section)
+    anywhere = limit_cycle(PAD, Belt(M, K, V), near=near)
+    assert cycle.period == pytest.approx(anywhere.period, rel=1e-9)
+    assert cycle.trace.v[0] == pytest.approx(float(section.split()[-1]), abs=1e-9)
+    assert cycle.trace.v[-1] == pytest.approx(cycle.trace.v[0], abs=1e-8)
+    assert cycle.states[1] == cycle.trace.rows.y[0, 1]

@@ -22,7 +22,7 @@ from tests.zoo import zoo_cases
 
 FAMILIES = ("pulled", "forced", "sines")
 LIMIT, BANK_LIMIT = 1e-6, 1e-7
-WELL = 1e-6  # how far differences of well-conditioned runs are apart
+WELL = 0.1  # of the limit: how far differences of well-conditioned runs are apart
 FEW = 2  # numbers of each run
 
 
@@ -60,7 +60,7 @@ def look(given: Namespace, index: int) -> Iterator[Seen]:
         return
     for each in found:
         shown = [run.subject, each, *trace.trust().of("sensitivity")]
-        well = each.known and each.noise < WELL
+        well = each.known and each.noise < WELL * limit
         wrong = well and each.error > limit + 3.0 * each.noise
         word = "wrong" if wrong else "right" if well else "ill" if each.known else "none"
         counts = {f"{kind} {word}": 1, "switches": len(trace.firings) if well else 0}
