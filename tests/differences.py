@@ -79,7 +79,7 @@ def _one(run: Run, trace: Trace, c: int, name: str) -> Compared:
     followed = trace.derived.followed
     got = np.concatenate([followed.end[:, c], followed.times[:, c]])
     size = _size(run, name)
-    found = []
+    found, steps = [], []
     for step in STEPS:
         try:
             up, down = (_end(run, trace, name, sign * step * size) for sign in (1.0, -1.0))
@@ -87,10 +87,13 @@ def _one(run: Run, trace: Trace, c: int, name: str) -> Compared:
             continue
         if up is not None and down is not None:
             found.append((up - down) / (2.0 * step * size))
+            steps.append(step)
     if len(found) < 2 or np.isnan(got).any():
         return Compared(name, np.inf, np.inf, known=False)
     table = np.array(found)
     apart = np.abs(np.diff(table, axis=0))
+    rounding = apart[-1] * steps[-1] / np.array(steps[1:])[:, None]  # grows as steps shrink
+    apart = np.maximum(apart, rounding)
     # Where rounding takes over from truncation: two noisy ones may agree by chance.
     rising = np.diff(apart, axis=0, append=np.inf) > 0.0
     best, columns = np.argmax(rising, axis=0), np.arange(got.size)
