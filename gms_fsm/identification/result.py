@@ -369,6 +369,12 @@ class Fit:
         if initial == "estimate":
             time = record.columns["time"]
             chosen = chosen & (time > time[0] + lead)
+            if not chosen.any():
+                raise RecordError(
+                    f"nothing is left of it after its first {lead:g} s",
+                    place=record.place,
+                    advice="give a shorter lead",
+                )
         return score_of(record.columns[column][chosen], modelled[chosen])
 
     # ------------------------------------------------------------------ how sure it is

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import ChartModel, Prescribed, Record, choose, fit, simulate
+from gms_fsm import Chart, ChartModel, Prescribed, Record, State, choose, fit, simulate
 from gms_fsm.errors import RecordError
 from gms_fsm.identification.joints import JOINTS, joint_candidates, joint_chart
 from tests.helpers import FASTEST
@@ -80,3 +80,15 @@ def test_choose_says_why_the_others_lost() -> None:
     assert why["load (M3)"] == "chosen"
     assert "worse on what was left out, in 3 of 3 folds" in why["Coulomb, viscous (M1)"]
     assert f"Coulomb, viscous (M1): {why['Coulomb, viscous (M1)']}" in str(found)
+
+
+def test_a_force_without_a_memory_needs_no_state_and_a_score_needs_rows():
+    t = np.arange(0.0, 2.0, 0.01)
+    v = 0.1 * np.sin(4.0 * t)
+    chart = Chart("plain", inputs=("v",), parameters=("c",), states=(State("on"),),
+                  outputs={"F": "c * v"})  # fmt: skip
+    record = Record.from_arrays(time=t, velocity=v, force=3.0 * v)
+    found = fit(record, ChartModel(chart, {"c": 1.0}), free=["c"], search="local", progress=False)
+    np.testing.assert_allclose(found.predict(record, initial="estimate", lead=0.5), 3.0 * v, 1e-6)
+    with pytest.raises(RecordError, match="nothing is left"):
+        found.score(record, "estimate", lead=9.0)

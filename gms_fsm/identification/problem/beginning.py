@@ -63,6 +63,8 @@ def estimated(
     short = short.ended()
     short = short.thinned(max(1, short.t.size // MOST_ROWS))
     subject, ranges = experiment.fitted(point), state_ranges(experiment, point)
+    if not ranges:  # a force without a memory
+        return {}
     terms = point.linear[len(experiment.solved) :]
     low, high = (np.concatenate([each[i] for each in ranges.values()]) for i in (0, 1))
     middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-300)
