@@ -89,6 +89,6 @@ def test_a_force_without_a_memory_needs_no_state_and_a_score_needs_rows():
                   outputs={"F": "c * v"})  # fmt: skip
     record = Record.from_arrays(time=t, velocity=v, force=3.0 * v)
     found = fit(record, ChartModel(chart, {"c": 1.0}), free=["c"], search="local", progress=False)
-    np.testing.assert_allclose(found.predict(record, initial="estimate", lead=0.5), 3.0 * v, 1e-6)
+    assert found.predict(record, initial="estimate", lead=0.5) == pytest.approx(3.0 * v, abs=1e-6)
     with pytest.raises(RecordError, match="nothing is left"):
         found.score(record, "estimate", lead=9.0)
