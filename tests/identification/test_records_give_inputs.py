@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, Prescribed, Record, State, choose, fit, simulate
+from gms_fsm.charts import CHARTS
 from gms_fsm.errors import RecordError
 from gms_fsm.identification.joints import JOINTS, joint_candidates, joint_chart
 from tests.helpers import FASTEST
@@ -92,3 +93,19 @@ def test_a_force_without_a_memory_needs_no_state_and_a_score_needs_rows():
     assert found.predict(record, initial="estimate", lead=0.5) == pytest.approx(3.0 * v, abs=1e-6)
     with pytest.raises(RecordError, match="nothing is left"):
         found.score(record, "estimate", lead=9.0)
+
+
+def test_an_estimated_state_is_found_where_two_elements_share_the_force():
+    model = ChartModel(CHARTS["maxwell-slip"], {"k": [4e4, 2e4], "F_c": [0.5, 1.0]}, n=2)
+    t = np.arange(0.0, 4.0, 0.01)
+
+    def record(v: Any, z: list[float]) -> Record:
+        run = simulate(model, Prescribed((t, v)), t[-1], t_eval=t, initial={"z": z}, engine=FASTEST)
+        force = run.F[-t.size :] + np.random.default_rng(1).normal(0.0, 5e-3, t.size)
+        return Record.from_arrays(time=t, velocity=v, force=force)
+
+    training = record(1e-3 * np.sin(2.0 * t), [0.0, 0.0])
+    found = fit(training, model, free=["k1", "F_c2"], search="local", progress=False)
+    later = record(2e-5 * np.sin(3.0 * t), [1e-5, -3e-5])
+    with pytest.warns(UserWarning, match="outside of what was trained on"):
+        assert found.score(later, "estimate", lead=0.5)["rmse"] < 0.01

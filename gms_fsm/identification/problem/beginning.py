@@ -21,6 +21,7 @@ from gms_fsm.identification.problem.task import Task
 
 ALIKE = 13  # first guesses: all elements alike, or all pulled by the same way
 ALONE = 3  # values of one element at a time
+ANYHOW = 20  # first guesses at random, times the number of values
 PASSES = 1
 MOST_ROWS = 400
 ROUNDS = 2  # of states and parameters in turn
@@ -89,6 +90,8 @@ def estimated(
     pulled = np.linspace(low.min(), high.max(), ALIKE)
     guesses = [np.full(low.size, share) for share in np.linspace(-1.0, 1.0, ALIKE)]
     guesses += [np.clip((each - middle) / half, -1.0, 1.0) for each in pulled]
+    # Elements share a force: each by itself cannot leave the sum that fits at the start.
+    guesses += [*np.random.default_rng(0).uniform(-1.0, 1.0, (ANYHOW * low.size, low.size))]
     least, best = min(((cost(q), i) for i, q in enumerate(guesses)))
     found = guesses[best]
     for _ in range(PASSES):
