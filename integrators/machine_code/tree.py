@@ -177,6 +177,8 @@ def may_write(expr: Expr) -> bool:
     --------
     >>> may_write(Invoke("f", "sin", (Local("f", "x"),)))
     False
+    >>> may_write(Invoke("i", "ask", (), writes=True))  # it knows where the memory is
+    True
     """
     made = [each for each in parts_of(expr) if isinstance(each, Invoke)]
     return any(each.writes or any(u.kind == "p" for u in each.arguments) for each in made)
