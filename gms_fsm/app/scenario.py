@@ -377,7 +377,7 @@ def _check_end(file: TomlFile, start: float, end: float) -> None:
         try:
             checked_times(start, end)
         except ParameterError as error:
-            raise file.blamed(error, ("run", error.place)) from None
+            raise file.blamed(ScenarioError.of(error), ("run", error.place)) from None
         return
     if "t_end" in file.data.get("run", {}):
         late = f"it must be later than t_start, {start!r}"

@@ -117,7 +117,8 @@ def limits_of(element: NamedFriction) -> list[str]:
     ]
     scale = next((c for c in element.constants if c.about.endswith("Stribeck velocity")), None)
     if scale is not None and not isinstance(scale.value, tuple):
-        found.insert(1, f"|v1 - v0| is at most {scale.name} = {scale.value!r} m/s")
+        unit = scale.about.partition(":")[0]
+        found.insert(1, f"|v1 - v0| is at most {scale.name} = {scale.value!r} {unit}")
     return found
 
 
