@@ -27,7 +27,7 @@ static inline void ${name}_compensator_init(${name}_compensator *c)
 static inline int ${name}_compensate(${name}_compensator *c, double reference$measured$arguments)
 {
     const double v = $velocity;
-    const int code = ${name}_advance(&c->friction, ${passed}$period);
+    const int code = ${name}_advance(&c->friction, ${passed}$period, ${name}_MAX_STEPS);
     if (code == ${name}_OK) {
         const double force = $gain * c->friction.F;
         c->v = v;
