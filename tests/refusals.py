@@ -3276,7 +3276,7 @@ rows = {
     "motion": ("body 'mass': motion", "rotary", {"body": {"motion": "rotary"}}),
     "rotary": ("body 'mass': rotary", 1, {"body": {"rotary": 1}}),
     "turns and moves": ("", "normal", {"body": {"motion": "normal", "rotary": True}}),
-    "unit of nothing": ("system 'one': units", "r", {"units": {"r": "m"}}),
+    "unit of nothing": ("system 'one': units", ..., {"units": {"r": "m"}}),
     "unit with a prefix": ("", "mm", {"numbers": {"r": 1.0}, "units": {"r": "mm"}}),
     "velocity of other units": (
         "system 'one', contact 'p'",

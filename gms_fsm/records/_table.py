@@ -80,9 +80,8 @@ class TextFormat:
         columns: Any = None,
     ) -> TextFormat:
         """Return the format with these options, checked."""
-        names: tuple[Any, ...] = ()
-        if columns is not None and not isinstance(columns, str):
-            names = tuple(columns)
+        named = isinstance(columns, Iterable) and not isinstance(columns, str)
+        names: tuple[Any, ...] = tuple(columns) if named else ()
         marks = (comment,) if isinstance(comment, str) else comment
         try:
             marks = tuple(marks)

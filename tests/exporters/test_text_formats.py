@@ -61,7 +61,7 @@ def test_a_friction_that_reads_everything(form: str) -> None:
     chart = loaded().chart
     for given in (loaded(), ChartModel(chart, {"mu": [0.3, 0.5]}, n=2, inputs={"N": "1 + t"})):
         files = formats()[form].write(Subject.of(given, form, name="friction"))
-        text, readme = files.values()
+        text, *_, readme = files.values()
         assert all(re.search(rf"\b{each}\b", text) for each in ("v", "x", "big", "rel", "mu"))
         assert "## How to run it" in readme
         assert "## What it does not do" in readme
