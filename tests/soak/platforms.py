@@ -33,6 +33,7 @@ from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording import compiled_run
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import system_of
+from integrators.machine_code import calls
 from integrators.machine_code.c99 import c99_text
 from integrators.runners import compiled
 from tests.helpers import FASTEST, ROOT, bits
@@ -110,8 +111,8 @@ def random_case(seed: int, index: int) -> Case:
 class CLibrary:
     """A shared library in place of machine code; see `integrators.machine_code.objects.Library`."""
 
-    def __init__(self, path: Path) -> None:
-        self._library = ctypes.CDLL(str(path))
+    def __init__(self, path: bytes) -> None:
+        self._library = ctypes.CDLL(path.decode())
 
     def address(self, name: str) -> int:
         """Return the address of a function."""
@@ -131,17 +132,19 @@ def in_c(compiler: str, level: str, warnings: Sequence[str] = ("-w",)) -> Iterat
     with tempfile.TemporaryDirectory() as folder:
         texts: list[str] = []
 
-        def library(text: str, arguments: Any, layout: Any, entries: Any, *_: Any) -> CLibrary:
+        def shared(name: str, layout: Any, entries: Any, *_: Any, **__: Any) -> bytes:
             texts.append(c99_text(compiled.translated(layout, entries).module))
             source = Path(folder) / f"{entries[0].function.__name__}{len(texts)}.c"
             source.write_text(texts[-1], encoding="utf-8")
             made = source.with_suffix(".so")
             command = [compiler, *FLAGS, *warnings, level, str(source), "-o", str(made), "-lm"]
             subprocess.run(command, check=True)
-            return CLibrary(made)
+            return bytes(made)
 
         with (
-            mock.patch.object(compiled, "_library", library),
+            mock.patch.object(compiled, "_object", shared),
+            mock.patch.object(compiled, "Library", CLibrary),
+            mock.patch.object(calls, "Library", CLibrary),
             mock.patch.object(compiled_run, "_known", {}),
             mock.patch.object(compiling, "_observers", {}),
         ):
