@@ -240,14 +240,14 @@ class Follower:
 
     def rows_of(self, times: list[float], states: list[list[float]], mode: Modes) -> None:
         """Go on along rows of one arc; those at its very start belong to the instant before."""
-        first = 0
-        while first < len(times) and times[first] <= self.t:
-            self.hold(states[first], mode)
-            first += 1
-        if first == len(times):
+        passed = 0
+        while passed < len(times) and times[passed] <= self.t:
+            self.hold(states[passed], mode)
+            passed += 1
+        if passed == len(times):
             return
         self.begin(mode)
-        self.integrate(times[first:], states[first:])
+        self.integrate(times[passed:], states[passed:])
 
     def begin(self, mode: Modes) -> None:
         """Begin an arc, if one does."""
@@ -264,9 +264,9 @@ class Follower:
         now = b.now
         end = bisect_right(recorded.stop_times, self.t)
         t, y = recorded.stop_times[end], recorded.stop_states[end].tolist()
-        first, last = bisect_right(recorded.times, self.t), bisect_left(recorded.times, t)
+        rows = slice(bisect_right(recorded.times, self.t), bisect_left(recorded.times, t))
         self.begin(hybrid.modes_of(b))
-        times, states = recorded.times[first:last], recorded.states[first:last].tolist()
+        times, states = recorded.times[rows], recorded.states[rows].tolist()
         self.integrate([*times, t], [*states, y])
         now.t = t
         now.y[:] = y

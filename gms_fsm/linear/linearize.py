@@ -296,12 +296,12 @@ class _Seeded:
         units = {self._label(*places[k]): self._unit(places[k][0]) for k in kept}
         units |= {name: unit for name, unit, _ in outputs}
         A_B, C_D = rates[np.ix_(kept, columns)], rows[:, columns]
-        n = len(kept)
+        size = len(kept)
         return LinearSystem(
-            A=A_B[:, :n],
-            B=A_B[:, n:],
-            C=C_D[:, :n],
-            D=C_D[:, n:],
+            A=A_B[:, :size],
+            B=A_B[:, size:],
+            C=C_D[:, :size],
+            D=C_D[:, size:],
             states=tuple(labels[k] for k in kept),
             inputs=self.chosen,
             outputs=tuple(name for name, _, _ in outputs),
