@@ -205,7 +205,8 @@ class StructuredText:
         element, cycle = self.element, self.form.dt
         v0, v1, step, before, begin = map(element.free, ("v0", "v1", "friction", "before", "begin"))
         (v, _), *others = element.inputs
-        velocities = [(v0, "m/s: velocity at the last call"), (v1, "m/s: velocity now")]
+        unit = f"{element.length}/s: velocity"
+        velocities = [(v0, f"{unit} at the last call"), (v1, f"{unit} now")]
         inputs = [*velocities, *others, (cycle, "s: since the last call")]
 
         def call(velocity: str, passed: str, length: str) -> str:
@@ -222,7 +223,8 @@ class StructuredText:
         yield from _block(
             "VAR_INPUT", (f"{each} : LREAL;{FORMS.note(about)}" for each, about in inputs)
         )
-        yield from _block("VAR_OUTPUT", [f"{self.force} : LREAL;  (* N: friction force *)"])
+        force = f"{self.force} : LREAL;  (* {element.force}: friction force *)"
+        yield from _block("VAR_OUTPUT", [force])
         locals_ = [f"{step} : {self.name};", f"{before} : LREAL;", f"{begin} : LREAL;"]
         yield from _block("VAR", locals_)
         yield f"{before} := 0.0;"
