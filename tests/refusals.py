@@ -2475,7 +2475,8 @@ group("step of a system", ParameterError, same_after, rows)
 opened = partial(dataclasses.replace, OPEN)
 rows = {
     "model": ("system", GIVEN, lambda: SystemState(GIVEN)),
-    "function": ("signal 'f'", ..., lambda: SystemState(opened(signals={"f": abs}))),
+    "function": (
+        "signal 'f'", ..., lambda: SystemState(opened(signals={"f": abs}), engine="compiled")),
     "record": (
         "signal 'f'", ..., lambda: SystemState(opened(signals={"f": ([0, 1], [0, 1])}))),
     "no location": ("settings", ..., lambda: SystemState(OPEN, events="step", max_step=0.1)),
