@@ -15,6 +15,7 @@ from gms_fsm import (
     ParameterError,
     Sampled,
     Session,
+    SignalEndError,
     SignalError,
     SimulationError,
     System,
@@ -23,6 +24,7 @@ from gms_fsm import (
     simulate,
 )
 from gms_fsm.charts import CHARTS
+from gms_fsm.run.stepped.plant import Plant
 from tests.adapters.loops import PERIOD, PID
 from tests.exporters.frictions import servo
 from tests.helpers import FASTEST, other_parts
@@ -185,3 +187,23 @@ def test_where_a_text_is_needed_it_is_refused_by_name(tmp_path: Any) -> None:
         with pytest.raises(ParameterError, match="outputs"):
             Sampled("pd", period=0.1, updates=updates, outputs=outputs)
     assert replace(system, name="other").controllers == system.controllers
+
+
+def test_where_stepping_fails_the_record_ends_and_nothing_is_made_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    commit = Plant.commit
+
+    def fails(plant: Plant, t: float, *lines: Any) -> None:
+        if t > 0.55:
+            raise SimulationError("it cannot continue", None)  # type: ignore[arg-type]
+        commit(plant, t, *lines)
+
+    whole = simulate(controlled(Watcher()), 0.5)
+    monkeypatch.setattr(Plant, "commit", fails)
+    with pytest.raises(SignalEndError) as caught:
+        simulate(controlled(Watcher()), 2.0)
+    assert caught.value.trace.t[-1] == pytest.approx(0.6)
+    part = caught.value.trace
+    now, before = (np.interp(0.45, each.t, each.body("sled").x) for each in (part, whole))
+    assert now == pytest.approx(before, rel=1e-3)

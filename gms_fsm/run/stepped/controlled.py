@@ -62,6 +62,7 @@ def controlled(
     records = {name: ([start], [value]) for name, value in values.items()}
     corners = {float(t) for each in given.values() for t in each.times if start < t < end}
     stops = sorted({start, *ticks.times.tolist(), *corners})
+    known = math.inf
     try:
         for t, after in zip(stops, [*stops[1:], end], strict=True):
             bits = ticks.at(t)
@@ -75,9 +76,10 @@ def controlled(
                 lines = {**held, **{u: _line(each, t, after) for u, each in given.items()}}
                 ends = [lines[name] for name in inputs]
                 plant.commit(after, [each[0] for each in ends], [each[1] for each in ends])
-    except SimulationError:
-        pass  # the run itself says so, with what there was before
-    return replace(plain, signals={**plain.signals, **{u: _held(*r) for u, r in records.items()}})
+    except SimulationError:  # the run says so, with what there was before, or that the records end
+        known = after
+    kept = {name: _record(*each, known) for name, each in records.items()}
+    return replace(plain, signals={**plain.signals, **kept})
 
 
 def _ticks(system: System, start: float, end: float) -> Ticks:
@@ -154,11 +156,13 @@ def _put(times: list[float], values: list[float], t: float, value: float, *, beg
         values += values[-1], value
 
 
-def _held(times: list[float], values: list[float]) -> Corners:
-    """Return a record that keeps its last value."""
-    if len(times) == 1:
+def _record(times: list[float], values: list[float], known: float) -> Corners:
+    """Return a record that keeps its last value, up to where it is known."""
+    if math.isfinite(known):
+        times, values = [*times, known], [*values, values[-1]]
+    elif len(times) == 1:
         times, values = [times[0] - 1.0, *times], [values[0], *values]
-    return Corners(np.array(times), np.array(values), held=True)
+    return Corners(np.array(times), np.array(values), held=not math.isfinite(known))
 
 
 def _line(signal: Corners, t: float, after: float) -> tuple[float, float]:
