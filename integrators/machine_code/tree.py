@@ -7,7 +7,7 @@ memory) and ``"p"`` (address). Names of locals are unique within a function.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -300,6 +300,59 @@ class Return:
 
 
 Statement = Assign | AssignMany | Put | Do | If | While | For | Break | Continue | Return
+
+
+def blocks_of(statement: Statement) -> tuple[tuple[Statement, ...], ...]:
+    """Return the blocks of statements inside a statement."""
+    match statement:
+        case If(body=body, orelse=orelse):
+            return body, orelse
+        case For(body=body) | While(body=body):
+            return (body,)
+    return ()
+
+
+def statements_of(body: Iterable[Statement]) -> Iterator[Statement]:
+    """Yield all statements, those inside others after them."""
+    for each in body:
+        yield each
+        for block in blocks_of(each):
+            yield from statements_of(block)
+
+
+def targets_of(statement: Statement) -> tuple[Local, ...]:
+    """Return the locals that a statement itself assigns to."""
+    match statement:
+        case Assign(target=target) | For(target=target):
+            return (target,)
+        case AssignMany(targets=targets):
+            return targets
+    return ()
+
+
+def expressions_of(statement: Statement) -> tuple[Expr, ...]:
+    """Return the expressions of a statement itself, without those of its blocks."""
+    match statement:
+        case Assign(value=value):
+            return (value,)
+        case AssignMany(call=call) | Do(call=call):
+            return (call,)
+        case Put(address=address, value=value):
+            return AddressOf(address), value
+        case If(test=test) | While(test=test):
+            return (test,)
+        case For(start=start, stop=stop):
+            return start, stop
+        case Return(values=values):
+            return values
+    return ()
+
+
+def expressions_in(body: Iterable[Statement]) -> Iterator[Expr]:
+    """Yield all expressions and their parts."""
+    for statement in statements_of(body):
+        for each in expressions_of(statement):
+            yield from parts_of(each)
 
 
 # --------------------------------------------------------------------------- modules

@@ -27,7 +27,7 @@ from integrators.machine_code.c99 import (
 )
 from integrators.machine_code.front_end.values import ArrayValue, NumberValue, RecordValue
 from integrators.machine_code.layout import BlockLayout
-from integrators.machine_code.readable.possible import changing_of, expressions_in
+from integrators.machine_code.readable.possible import changing_of
 from integrators.machine_code.tree import (
     SIZES,
     Address,
@@ -39,6 +39,7 @@ from integrators.machine_code.tree import (
     Local,
     Module,
     TypedFunction,
+    expressions_in,
 )
 
 __all__ = ["CBlock", "records_text"]

@@ -37,17 +37,16 @@ from integrators.machine_code.tree import (
     Statement,
     TypedFunction,
     While,
+    expressions_in,
     parts_of,
+    statements_of,
 )
 
 __all__ = [
     "BlockStart",
     "Possible",
     "changing_of",
-    "expressions_in",
-    "expressions_of",
     "impossible",
-    "statements_of",
 ]
 
 Values = frozenset[Const] | None  # None: any
@@ -67,41 +66,6 @@ _TYPES: Mapping[str, Any] = {"f": float, "i": int, "b": bool}
 
 
 # --------------------------------------------------------------------------- walking
-def expressions_of(statement: Statement) -> tuple[Expr, ...]:
-    """Return the expressions of a statement itself, without those of its blocks."""
-    match statement:
-        case Assign(value=value):
-            return (value,)
-        case AssignMany(call=call) | Do(call=call):
-            return (call,)
-        case Put(address=address, value=value):
-            return AddressOf(address), value
-        case If(test=test) | While(test=test):
-            return (test,)
-        case For(start=start, stop=stop):
-            return start, stop
-        case Return(values=values):
-            return values
-    return ()
-
-
-def statements_of(body: Iterable[Statement]) -> Iterator[Statement]:
-    """Yield all statements, those inside others after them."""
-    for each in body:
-        yield each
-        if isinstance(each, If | While | For):
-            yield from statements_of(each.body)
-        if isinstance(each, If):
-            yield from statements_of(each.orelse)
-
-
-def expressions_in(body: Iterable[Statement]) -> Iterator[Expr]:
-    """Yield all expressions and their parts."""
-    for statement in statements_of(body):
-        for each in expressions_of(statement):
-            yield from parts_of(each)
-
-
 def root_of(expr: Expr) -> str:
     """Return the local from which an address is found; empty if there is none."""
     match expr:

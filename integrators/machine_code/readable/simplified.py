@@ -15,13 +15,10 @@ from integrators.machine_code.readable.possible import (
     INFINITE,
     BlockStart,
     Possible,
-    expressions_in,
-    expressions_of,
     fails,
     holds,
     impossible,
     never,
-    statements_of,
 )
 from integrators.machine_code.tree import (
     Address,
@@ -50,7 +47,10 @@ from integrators.machine_code.tree import (
     Statement,
     TypedFunction,
     While,
+    expressions_in,
+    expressions_of,
     parts_of,
+    statements_of,
 )
 
 __all__ = ["simplified"]

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 from integrators.machine_code.tree import (
     Assign,
     AssignMany,
-    Do,
     Expr,
     For,
-    If,
     Invoke,
     Load,
     Local,
@@ -21,10 +19,14 @@ from integrators.machine_code.tree import (
     Return,
     Statement,
     TypedFunction,
-    While,
+    blocks_of,
+    expressions_in,
+    expressions_of,
     locals_in,
     may_write,
     parts_of,
+    statements_of,
+    targets_of,
 )
 
 
@@ -52,75 +54,28 @@ def _declare(
     seen = frozenset[str]()
     for statement, names in zip(block, mentioned, strict=True):
         alone = frozenset(name for name in names if counts[name] == 1)
-        read = frozenset(each.name for expr in _read_by(statement) for each in locals_in(expr))
-        set_here = frozenset(each.name for each in _set_by(statement))
+        read = frozenset(u.name for expr in expressions_of(statement) for u in locals_in(expr))
+        set_here = frozenset(each.name for each in targets_of(statement))
         if isinstance(statement, For):
             set_here &= alone
         if new := (set_here & names) - read - seen:
             found[id(statement)] = new
         seen |= names
-        inner = _blocks_of(statement)
+        inner = blocks_of(statement)
         for k, each in enumerate(inner):
             others = _names_in(*(u for j, u in enumerate(inner) if j != k))
             _declare(each, alone - read - set_here - others, found)
 
 
 def _names_in(*blocks: tuple[Statement, ...]) -> frozenset[str]:
-    names: set[str] = set()
-    for statement in _all_in(*blocks):
-        names.update(each.name for each in _set_by(statement))
-        names.update(each.name for expr in _read_by(statement) for each in locals_in(expr))
-    return frozenset(names)
+    read = (u.name for block in blocks for u in expressions_in(block) if isinstance(u, Local))
+    return assigned(*blocks) | frozenset(read)
 
 
 def assigned(*blocks: tuple[Statement, ...]) -> frozenset[str]:
     """Return the names of the locals that statements assign to."""
-    return frozenset(u.name for each in _all_in(*blocks) for u in _set_by(each))
-
-
-def _all_in(*blocks: tuple[Statement, ...]) -> Iterator[Statement]:
-    for block in blocks:
-        for each in block:
-            yield each
-            yield from _all_in(*_blocks_of(each))
-
-
-def _blocks_of(statement: Statement) -> tuple[tuple[Statement, ...], ...]:
-    match statement:
-        case If(body=body, orelse=orelse):
-            return body, orelse
-        case For(body=body) | While(body=body):
-            return (body,)
-    return ()
-
-
-def _set_by(statement: Statement) -> tuple[Local, ...]:
-    """Return the locals that a statement itself assigns to."""
-    match statement:
-        case Assign(target=target) | For(target=target):
-            return (target,)
-        case AssignMany(targets=targets):
-            return targets
-    return ()
-
-
-def _read_by(statement: Statement) -> tuple[Expr, ...]:
-    """Return the expressions of a statement itself."""
-    match statement:
-        case Assign(value=value):
-            return (value,)
-        case AssignMany(call=call) | Do(call=call):
-            return (call,)
-        case Put(address=address, value=value):
-            index = () if address.index is None else (address.index,)
-            return address.base, *index, value
-        case If(test=test) | While(test=test):
-            return (test,)
-        case For(start=start, stop=stop):
-            return start, stop
-        case Return(values=values):
-            return values
-    return ()
+    within = (each for block in blocks for each in statements_of(block))
+    return frozenset(u.name for each in within for u in targets_of(each))
 
 
 # --------------------------------------------------------------------------- copies
@@ -134,11 +89,9 @@ def without_copies(function: TypedFunction) -> TypedFunction:
     >>> without_copies(made).body == (Return((u,)),)
     True
     """
-    everything = [*_all_in(function.body)]
-    reads = Counter(
-        each.name for statement in everything for u in _read_by(statement) for each in locals_in(u)
-    )
-    sets = Counter(each.name for statement in everything for each in _set_by(statement))
+    reads = Counter(u.name for u in expressions_in(function.body) if isinstance(u, Local))
+    within = statements_of(function.body)
+    sets = Counter(u.name for each in within for u in targets_of(each))
     once = {name for name, count in reads.items() if count == 1 and sets[name] == 1}
     body = _joined(function.body, once)
     left = _names_in(body)

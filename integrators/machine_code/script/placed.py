@@ -7,7 +7,7 @@ and so does a function that nobody calls.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from integrators.machine_code.tree import (
     Local,
     Module,
     TypedFunction,
+    expressions_in,
     may_write,
 )
 
@@ -56,8 +57,9 @@ def placed(module: Module, known: Mapping[str, Const]) -> Module:
         made = replace(function, body=_changed(function.body, _with(given)))
         kept = tuple(each for each in function.parameters if each.name not in given)
         done.append(replace(made, parameters=kept))
-        for call in _calls_in(made.body):
-            calls.setdefault(call.name, []).append(call)
+        for call in expressions_in(made.body):
+            if isinstance(call, Invoke):
+                calls.setdefault(call.name, []).append(call)
 
     def shorter(part: Any) -> Any:
         if not isinstance(part, Invoke):
@@ -96,14 +98,3 @@ def _changed(part: Any, change: Callable[[Any], Any]) -> Any:
     new = {name: _changed(each, change) for name, each in old.items()}
     same = all(new[name] is each for name, each in old.items())
     return change(part if same else type(part)(**new))
-
-
-def _calls_in(part: Any) -> Iterator[Invoke]:
-    if isinstance(part, tuple):
-        for each in part:
-            yield from _calls_in(each)
-    elif dataclasses.is_dataclass(part):
-        if isinstance(part, Invoke):
-            yield part
-        for name in part.__dataclass_fields__:
-            yield from _calls_in(getattr(part, name))
