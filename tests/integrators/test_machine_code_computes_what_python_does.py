@@ -424,7 +424,7 @@ def in_c(module, folder):
                "-fPIC", "-shared", "text.c", "-o", "text.so", "-lm"]  # fmt: skip
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return CLibrary(folder / "text.so")
+    return CLibrary(bytes(folder / "text.so"))
 
 
 OTHERS = ("llvm, outside", "c99", "c99, outside")
