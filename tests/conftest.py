@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import gc
 import importlib.util
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -31,11 +32,18 @@ SLOW_EXAMPLES = (
 )
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark examples that take long as slow."""
+    """Mark examples that take long as slow; leave cases between every n-th to `make foreign`."""
+    seen = Counter[str]()
     for item in items:
         if item.nodeid.startswith(SLOW_EXAMPLES):
             item.add_marker(pytest.mark.slow)
+        if every := item.get_closest_marker("every"):
+            of = item.nodeid.partition("[")[0]
+            if seen[of] % every.args[0]:
+                item.add_marker(pytest.mark.matrix)
+            seen[of] += 1
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

@@ -36,6 +36,7 @@ def _servo(**options: Any) -> tuple[float, int]:
     return float(y[2]), switches
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "error"),

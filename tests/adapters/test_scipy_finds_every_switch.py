@@ -64,6 +64,7 @@ WAYS: dict[Any, float] = {"RK45": 5e-5, "Radau": 1e-6, "LSODA": 5e-4, "dp45": 5e
 WAYS |= {scipy.integrate.DOP853: 5e-6, 2e-3: 4e-4}
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("way", matrix([*WAYS], ["RK45", "Radau", "LSODA", "dp45", 1e-2]))
 def test_located_or_on_straight_lines_between_samples(reference: Trace, way: Any) -> None:

@@ -146,6 +146,7 @@ def test_motions_are_made_for_a_file_of_ones_own(cover: CommandLine) -> None:
     assert "not taken" not in answer.out
 
 
+@pytest.mark.matrix
 def test_a_short_share_of_generated_motions_is_told(cover: CommandLine) -> None:
     answer = cover("backlash", "--generate", "--bounds", "v=0..1", "--fail-under", "100")
     assert answer.code == 1

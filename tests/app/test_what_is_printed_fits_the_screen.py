@@ -59,6 +59,7 @@ def narrow(gms_fsm: CommandLine, monkeypatch: pytest.MonkeyPatch) -> CommandLine
     return gms_fsm
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("arguments", PRINTED)
 def test_no_line_is_longer_than_the_screen(arguments: str, narrow: CommandLine) -> None:

@@ -119,6 +119,7 @@ def test_debug_steps_through_it(copy: Copy) -> None:
     assert "unload_forward does not fire: v < 0 is false by 49.2 mm/s" in told
 
 
+@pytest.mark.matrix
 def test_the_zoo_makes_its_page(copy: Copy) -> None:
     pytest.importorskip("pygraphviz", reason="the pages have pictures")
     pytest.importorskip("z3", reason="the pages have proofs")

@@ -85,6 +85,7 @@ def press(pull: str, power: str, load: str, chart: str, let: dict[str, str]) -> 
     )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("chart", ["stiction", "karnopp"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_system_of_named_expressions_has_the_bits_of_the_written_out_one(

@@ -264,6 +264,7 @@ def test_a_name_is_refused_or_changes_nothing(plain: list[Trace]) -> None:
             _equal_but_for_names(_named(parameter, variable, *PLAIN[2:]), plain, place)
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("states", "edge"),

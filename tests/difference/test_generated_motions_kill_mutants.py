@@ -22,6 +22,7 @@ def with_z3() -> None:
     pytest.importorskip("z3", reason="needs z3 (extra: check)")
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["dog-clutch", "gms-signed"])
 def test_the_table_of_the_docs_is_what_is_found(name: str) -> None:

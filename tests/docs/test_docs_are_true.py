@@ -31,8 +31,12 @@ PAGES = [
     if not path.name.startswith("lesson_")  # made from the lessons and run as notebooks
     and path.name != "paper.md"  # run in tests/app/test_paper_reproduction.py
 ]
-# Long runs: `make foreign` runs these pages, `make test` those of the other models.
-LONG = ("bouc-wen.md", "elasto-plastic.md", "lugre-sigma1.md", "seven-parameter.md")
+# Long runs: `make foreign` runs these pages, `make test` all others.
+LONG = (
+    *("bouc-wen.md", "elasto-plastic.md", "lugre-sigma1.md", "seven-parameter.md"),
+    *("choose.md", "compensation.md", "coverage.md", "exporting-figures.md", "exports.md"),
+    *("own-loops-mujoco.md", "own-loops-scipy.md", "robot-joint.md", "servo.md"),
+)
 FIGURES = "exporting-figures.md"  # draws each format; tests/plots draws each figure
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
 EXTRAS = set(

@@ -54,6 +54,7 @@ def outside(address: str) -> bool:
     return re.match(r"(?:[a-z]+:)?//", address) is not None
 
 
+@pytest.mark.matrix
 def test_the_strict_build_passes_and_pages_load_nothing_external(built: Built) -> None:
     assert built.code == 0, built.said
     assert "WARNING" not in built.said

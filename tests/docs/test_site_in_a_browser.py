@@ -172,6 +172,7 @@ def test_dark_pictures_lie_on_the_dark_ground_and_keep_their_hues(built: Built) 
 
 
 # --------------------------------------------------------------------------- for everybody
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("width", "scheme"),
     matrix(

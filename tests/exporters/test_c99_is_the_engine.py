@@ -54,6 +54,7 @@ QUICK = "-O0"  # compiles in a fraction of the time, where the claim is not abou
 
 
 # A bank, a sampled controller, sliding.
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", matrix([*DENSE], ["GMS 4", "servo", "between states"]))
 def test_the_bits_on_a_random_record(name: str, tmp_path: Path) -> None:
     given, t, inputs = dense(name, 1)
@@ -186,6 +187,7 @@ def test_the_entry_of_the_default_state_follows_a_number(tmp_path: Path) -> None
 
 
 # --------------------------------------------------------------------------- the program
+@pytest.mark.every(2)
 @pytest.mark.parametrize("start", matrix([0.0, 0.5, 1.0], [0.0, 1.0]))
 def test_jumps_and_a_later_start(start: float, tmp_path: Path) -> None:
     friction = ChartModel(CHARTS["maxwell-slip"], {"k": 10.0, "F_c": 0.2}, sigma_2=0.1)

@@ -102,6 +102,7 @@ def made(model: Model, cycles: int, size: float = 1e-3, seed: int = 0) -> Record
     return Record.from_arrays(time=t, velocity=v, force=force, name=f"{size:g} m")
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_backlash_is_found_in_the_cycles_left_out() -> None:
     pytest.importorskip("llvmlite", reason="fits take long without machine code")

@@ -40,6 +40,7 @@ CASES = [
 KEPT = [("gms", "signed"), ("maxwell-slip", ""), ("elasto-plastic", ""), ("dahl", "")]
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "law"), matrix(CASES, KEPT))
 @pytest.mark.filterwarnings("ignore:published law")

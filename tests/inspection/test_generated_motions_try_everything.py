@@ -37,6 +37,7 @@ def backlash() -> Generated:
     return generate(charts()["backlash"])
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SOME)
 def test_every_edge_every_pair_and_every_comparison_is_tried(name: str) -> None:
@@ -55,6 +56,7 @@ def test_what_time_forbids_is_proved_to_be_out_of_reach() -> None:
     assert found.open == ()
 
 
+@pytest.mark.matrix
 def test_without_a_proof_it_is_open(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gms_fsm.generation.generate.numbers_fit", lambda _: False)
     (never,) = generate(charts()["dog-clutch"]).open

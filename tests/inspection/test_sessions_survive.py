@@ -149,6 +149,7 @@ else:
 """
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_session_of_100_000_rows_needs_less_than_150_MB() -> None:
     pytest.importorskip("resource")

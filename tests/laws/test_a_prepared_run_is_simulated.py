@@ -49,6 +49,7 @@ def repeated(ready: Prepared, numbers: dict[str, Any]) -> tuple[Trace | None, st
         return getattr(error, "trace", None), f"{type(error).__name__}: {error}"
 
 
+@pytest.mark.every(3)
 @each([*CORPUS, *FAILING], {*FEW, *QUICK, *[*FAILING][::4]})
 def test_every_number_can_be_changed(name: str) -> None:
     one = run(name)

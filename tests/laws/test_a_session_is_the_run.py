@@ -5,6 +5,7 @@ from __future__ import annotations
 from random import Random
 
 import numpy as np
+import pytest
 
 from gms_fsm import Session, Trace
 from tests.corpus import FAILING, FEW, each, outcome, run
@@ -21,6 +22,7 @@ def session_of(name: str, **more: object) -> Session:
     return Session(*run(name).subject, run(name).t_end, **{**how, **more})
 
 
+@pytest.mark.every(2)
 @each(FEW)
 def test_to_the_end(name: str) -> None:
     session = session_of(name)
@@ -29,6 +31,7 @@ def test_to_the_end(name: str) -> None:
     assert other_parts(session.branch.trace(), whole_of(name)) == []
 
 
+@pytest.mark.every(3)
 @each(FAILING)
 def test_a_failure_is_an_outcome(name: str) -> None:
     session = session_of(name)
@@ -39,6 +42,7 @@ def test_a_failure_is_an_outcome(name: str) -> None:
     assert other_parts(session.branch.trace(), whole_of(name)) == []
 
 
+@pytest.mark.every(2)
 @each(FEW)
 def test_wherever_it_goes_it_shows_the_rows_of_the_run(name: str) -> None:
     """Steps, backward too, to transitions and to times, at random; repeat with the same name."""

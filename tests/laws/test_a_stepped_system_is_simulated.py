@@ -123,6 +123,7 @@ def test_inputs_are_signals(signal: SignalLike) -> None:
     assert one.body("sled").x.tolist() == other.body("sled").x.tolist()
 
 
+@pytest.mark.matrix
 def test_a_tolerance_without_a_scale_knows_nothing_of_inputs_to_come() -> None:
     system = replace(
         sled(), contacts=(Contact("pad", CHARTS["dahl"], {"sigma_0": 9.0, "F_c": 1.0}),)

@@ -56,6 +56,7 @@ def same(found: Sweep, other: Sweep) -> None:
     assert (found.edges, found.contacts) == (other.edges, other.contacts)
 
 
+@pytest.mark.every(3)
 @each(FEW, {*QUICK, "system servo"})
 def test_each_row_is_a_run(name: str, tmp_path: Path) -> None:
     found, alone = swept(name)
@@ -82,6 +83,7 @@ def test_each_row_is_a_run(name: str, tmp_path: Path) -> None:
     same(Sweep.load(found.save(tmp_path / "runs.npz")), found)
 
 
+@pytest.mark.every(3)
 @each(FAILING)
 def test_a_failure_is_the_outcome_of_its_run(name: str) -> None:
     what, one = mounted(*run(name).subject), run(name)

@@ -27,6 +27,7 @@ TRANSLATED = (
 IN_A_MATRIX = {"system puck", "functions that jump", "events at given times"}
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 @each(TRANSLATED, {*TRANSLATED} - IN_A_MATRIX)

@@ -67,6 +67,7 @@ def check(name: str, engine: str) -> None:
     same_logs(end, whole)
 
 
+@pytest.mark.every(2)
 @each(CORPUS, SOME)
 def test_a_run_counts_its_rows(name: str) -> None:
     check(name, FASTEST)
@@ -78,6 +79,7 @@ def test_so_it_does_in_python(name: str, engine: str) -> None:
     check(name, engine)
 
 
+@pytest.mark.every(2)
 @each(FAILING)
 def test_a_run_that_stops_has_counted_its_rows(name: str) -> None:
     whole, _ = outcome(name, in_turn(name))

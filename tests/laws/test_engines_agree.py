@@ -66,6 +66,7 @@ def test_failures_say_the_same_and_keep_the_same(name: str) -> None:
         assert other_parts(one, other) == [], engine
 
 
+@pytest.mark.every(2)
 @each(FAILING)
 @pytest.mark.parametrize("output", ["end", "t_eval"])
 def test_failures_are_the_same_whatever_is_recorded(name: str, output: str) -> None:

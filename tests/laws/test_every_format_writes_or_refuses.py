@@ -39,6 +39,7 @@ def there(folder: Path) -> dict[str, bytes]:
     return {each.relative_to(folder).as_posix(): each.read_bytes() for each in files}
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("form", "name"), matrix(PAIRS, {*PAIRS} - SLOWER))
 def test_it_is_written_or_refused(
     form: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -32,6 +32,7 @@ from tests.helpers import FASTEST, other_parts, same_bits
 FUNCTIONS = {"a function", "no slope"}
 
 
+@pytest.mark.every(3)
 @each(CORPUS, KINDS)
 def test_a_trace_in_npz_is_whole(name: str, tmp_path: Path) -> None:
     """Rows, stops, log, settings and titles; the chart is that of the run; equal, its bytes too."""
@@ -61,6 +62,7 @@ def test_what_is_read_runs_as_it_did(name: str, tmp_path: Path) -> None:
     assert other_parts(again, one) == []
 
 
+@pytest.mark.every(3)
 @each([*FEW, *FAILING])
 def test_a_trace_in_csv_is_whole_but_for_its_stops(name: str, tmp_path: Path) -> None:
     one, _ = outcome(name)
@@ -73,6 +75,7 @@ def test_a_trace_in_csv_is_whole_but_for_its_stops(name: str, tmp_path: Path) ->
     assert again.read_bytes() == path.read_bytes()
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @each(FEW, QUICK)
 def test_verdicts_are_those_of_the_run(name: str, tmp_path: Path) -> None:
@@ -92,6 +95,7 @@ def test_verdicts_are_those_of_the_run(name: str, tmp_path: Path) -> None:
         assert read.sample([one.t[-1]]).monitors == read.refined(50).monitors == one.monitors
 
 
+@pytest.mark.every(2)
 @each(FEW, {*QUICK, "several rates"})
 def test_a_session_is_where_it_was(name: str, tmp_path: Path) -> None:
     """After a walk, a poke and a breakpoint; saved twice it is the same file."""

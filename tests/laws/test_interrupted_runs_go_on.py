@@ -43,6 +43,7 @@ def _short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gms_fsm.run.recording.compiled_run.STEPS_AT_ONCE", 30)
 
 
+@pytest.mark.every(3)
 @each(sorted(set(CORPUS) - LEFT_OUT), KINDS)
 def test_a_run_goes_on_bit_for_bit(name: str, tmp_path: Path) -> None:
     path = tmp_path / "run.checkpoint"

@@ -6,10 +6,12 @@ An impact moves a locked contact for no time: the next micro-step lets go.
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.corpus import SYSTEM_RUNS, each, trace
 
 
+@pytest.mark.every(2)
 @each(SYSTEM_RUNS)
 def test_its_velocity_is_zero(name: str) -> None:
     whole = trace(name)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from gms_fsm import Prescribed, PulledSlider, Slider
 from tests.corpus import FORCES, GMS_RUNS, KINDS, METHOD_RUNS, SIGNAL_RUNS, Run, each, run, trace
@@ -52,6 +53,7 @@ def exchanged(edge: str) -> str:
     return f"{head}_{pair[last]}" if last in pair else edge
 
 
+@pytest.mark.every(2)
 @each(ODD, KINDS)
 def test_the_mirrored_run(name: str) -> None:
     one, other = trace(name, "ifelse"), mirror_of(run(name))(engine="ifelse")

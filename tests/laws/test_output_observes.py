@@ -25,6 +25,7 @@ def whole_of(name: str) -> Trace:
     return trace(name, in_turn(name))
 
 
+@pytest.mark.every(3)
 @each(CORPUS, KINDS)
 def test_the_end_is_the_last_of_all_rows(name: str) -> None:
     whole, end = whole_of(name), run(name)(engine=in_turn(name), t_eval=None, output="end")
@@ -36,6 +37,7 @@ def test_the_end_is_the_last_of_all_rows(name: str) -> None:
     same_logs(end, whole)
 
 
+@pytest.mark.every(3)
 @each(CORPUS, KINDS)
 def test_requested_rows_are_those_of_the_run(name: str) -> None:
     """A row on a switch is the one after it; both sides of every stop are kept beside them."""

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from gms_fsm import ElementMachines, System, Trace
 from tests.corpus import ENGINES, FEW, each, run, trace
 from tests.helpers import other_parts, same_logs
@@ -53,6 +55,7 @@ def seen(name: str, engine: str, **output: Any) -> tuple[Trace, list[Call]]:
     return found, calls
 
 
+@pytest.mark.every(2)
 @each(FEW)
 def test_every_callback_at_every_firing(name: str) -> None:
     found: list[list[Call]] = []

@@ -41,6 +41,7 @@ def in_units(name: str, **by: float) -> list[str]:
     return other_bits(there, here, **by)
 
 
+@pytest.mark.every(3)
 @each(RIG_RUNS, KINDS)
 def test_every_run_on_a_shipped_rig(name: str) -> None:
     """Each in one other unit, in turn."""
@@ -56,6 +57,7 @@ def test_every_run_on_a_shipped_rig(name: str) -> None:
     assert in_units(name, **by) == [], by
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "axis", "exponent"), IN_TURN)
 def test_shipped_scenarios_in_all_units(name: str, axis: str, exponent: int) -> None:

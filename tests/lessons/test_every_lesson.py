@@ -77,6 +77,7 @@ def test_a_module_in_the_folder_is_a_lesson() -> None:
     assert len({lesson.question for lesson in LESSONS.values()}) == len(LESSONS)
 
 
+@pytest.mark.every(2)
 @each_lesson
 def test_the_five_lines_say_what_was_measured(ran: Ran, number: int) -> None:
     question, run, first, second, moral = ran(number).lines()
@@ -139,6 +140,7 @@ def test_who_computes_from_what_is_printed_is_right_and_who_does_not_is_not(
             assert verdict == right, said
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @each_lesson
 def test_its_figure_has_units_and_nothing_overlaps(ran: Ran, number: int) -> None:

@@ -129,6 +129,7 @@ def test_a_finer_tolerance_changes_nothing() -> None:
     compared(measure_phenomena(["lugre", "stiction"], bench=Bench(rtol=1e-10)))
 
 
+@pytest.mark.matrix
 def test_forces_eight_times_as_large_show_the_same() -> None:
     forces = ("F_c", "F_s", "sigma_0", "sigma_1", "sigma_2", "mass", "stiffness")
     bench = dataclasses.replace(BENCH, **{name: 8 * getattr(BENCH, name) for name in forces})

@@ -36,6 +36,7 @@ COUNT = 3  # make soak takes 500 of each family
 CLOSE_TO_S = (("literature", 202, 41), ("literature", 206, 20), ("literature", 306, 84))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_no_switch_is_lost_or_made_up(family: str) -> None:
     found = [judge(trial(family, 14, index)) for index in range(COUNT)]
@@ -110,6 +111,7 @@ def test_the_witness_agrees_about_the_pulled_mass() -> None:
     agrees(Trial("pulled mass", 0, 0, *pulled_mass(), 20.0))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("family", "index"), [*zip(FAMILIES, (4, 4, 0, 17), strict=True)])
 def test_the_witness_agrees_about_a_trial_of_each_family(family: str, index: int) -> None:
     """The first of each that has 6 to 20 switches."""

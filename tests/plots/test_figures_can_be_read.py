@@ -227,6 +227,7 @@ EVERY = [
 ]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("name", "preset"), matrix(EVERY, PRINTED))
 def test_texts_can_be_read_in_print(name: str, preset: str) -> None:
     with plots.preset(preset) as sizes:
@@ -298,6 +299,7 @@ PAIRS = list(itertools.product(KINDS, FIGURES))
 SOME = [*PAIRS[9::13], ("broken off", "overview")]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("name", "kind"), matrix(PAIRS, SOME))
 def test_every_figure_takes_every_run(name: str, kind: str, tmp_path: Path) -> None:
     trace = run(name)
@@ -486,6 +488,7 @@ def test_tables_of_phenomena_without_curves_and_with_narrow_cells() -> None:
     assert "width of the loop at 25 rad/s (shows it if > 0.5 %" in figure.get_supxlabel()
 
 
+@pytest.mark.matrix
 def test_what_slides_away_ends_on_the_scale_of_the_others() -> None:
     names = ["gms-signed", "maxwell-slip", "rate-state-slip"]
     figure = figures.phenomenon_figure(measure_phenomena(names, ["memory"]), "memory")

@@ -156,6 +156,7 @@ def mounted(found: Entry, law: str) -> tuple[Any, ...]:
 TENTH = {*every()[::10], ("planar-coulomb", "")}
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("name", "law"), matrix(every(), TENTH))
 def test_every_chart_has_a_film(name: str, law: str, tmp_path: Path) -> None:
     try:

@@ -59,6 +59,7 @@ def checked(model: Model) -> set[str]:
 KEPT = {*ZOO[::9], ("modelica", "")}
 
 
+@pytest.mark.every(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "law"), matrix(ZOO, KEPT))
 def test_charts_of_the_zoo(name: str, law: str) -> None:
@@ -68,6 +69,7 @@ def test_charts_of_the_zoo(name: str, law: str) -> None:
     assert name != "modelica" or any(text.startswith("from ↓") for text in texts)
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_bank_of_twelve() -> None:
     texts = checked(bank(12))

@@ -106,6 +106,7 @@ def some_rows(trace: Trace) -> list[int]:
     return sorted({0, len(trace) - 1, *range(0, len(trace), 25), *near})[:100]
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["bank", "three states", "wanted times", "pulled", "pad2"])
 def test_the_look_agrees_with_the_log_and_the_svg_shows_it(name: str) -> None:

@@ -82,6 +82,7 @@ def picture(name: str, direction: str) -> Picture:
     return chart_picture(chart, elements, direction=direction, **options)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("name", "direction"), matrix(BOTH, KEPT))
 def test_nothing_overlaps_and_all_texts_are_large_enough(name: str, direction: str) -> None:
     drawn, (_, elements, options) = picture(name, direction), CASES[name]

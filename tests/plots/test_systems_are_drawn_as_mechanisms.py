@@ -102,6 +102,7 @@ DRAWN = ("ball_screw_table", "belt_driven_mass", "brake_squeal", "friction_dampe
 DRAWN += ("two-mass servo", "a train of four", "a puck")
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", matrix(sorted(systems()), DRAWN))
 def test_everything_is_drawn_once_and_nothing_overlaps(name: str) -> None:

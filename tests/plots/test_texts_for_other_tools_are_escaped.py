@@ -136,6 +136,7 @@ def hostile(monkeypatch: pytest.MonkeyPatch) -> Chart:
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_mermaid_itself_reads_the_same_chart(hostile: Chart) -> None:
     """One call for all charts: starting node takes longer than reading them."""

@@ -137,6 +137,7 @@ def test_branches_are_made_compared_named_exported_and_deleted(host: Host) -> No
     expect(page.get_by_label("Slip law")).to_have_value("published")
 
 
+@pytest.mark.matrix
 def test_the_page_listens_to_its_host_only_and_pictures_cannot_act(host: Host) -> None:
     title = host.replay("document.title")
     host.replay("dispatchEvent(new MessageEvent('message', {data: {go: 30}, source: window}))")

@@ -66,6 +66,7 @@ def peak(engine: str, transitions: int, **options: float) -> tuple[int, Trace]:
         gc.unfreeze()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("engine", "transitions"),
     matrix([compiled, ("ifelse", 200), ("machines", 200)], [compiled, ("ifelse", 200)]),
@@ -80,6 +81,7 @@ def test_memory_grows_with_the_log_only(engine: str, transitions: int) -> None:
     assert (many - few) / more < BYTES_A_FIRING
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("engine", [pytest.param("compiled", marks=compiled.marks), "ifelse"])
 def test_ten_times_the_steps_take_no_more_memory(engine: str) -> None:
     load_once(engine)

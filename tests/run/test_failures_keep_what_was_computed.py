@@ -49,6 +49,7 @@ SAID = {
 }  # fmt: skip
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", SAID)
 def test_what_a_failure_says(name: str) -> None:
     for word in SAID[name]:

@@ -59,6 +59,7 @@ def test_ctrl_c_within_a_step_keeps_the_previous_steps(call: int) -> None:
     np.testing.assert_array_equal(part.rows.y, whole.rows.y[:count])
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("options", OPTIONS)
 def test_ctrl_c_between_any_two_lines_of_the_recorder_leaves_a_complete_trace(
     options: str, tmp_path: Path

@@ -281,6 +281,7 @@ def _one_nursery() -> Iterator[None]:
     end_nursery()
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("name", "share"), [*zip(WRITERS, itertools.cycle(SHARES), strict=False)])
 def test_killed_at_some_moment(name: str, share: float, tmp_path: Path) -> None:
     if name == "run":

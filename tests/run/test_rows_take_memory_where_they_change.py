@@ -56,6 +56,7 @@ def equal(one: Trace, other: Trace) -> None:
     assert one.transitions.tobytes() == other.transitions.tobytes()
 
 
+@pytest.mark.matrix
 def test_two_thousand_elements_one_by_one_take_less_than_60_MB(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -424,6 +424,7 @@ def test_the_next_run_of_a_task_does_not_write_into_the_rows_of_the_one_before()
         np.testing.assert_array_equal(found.rows["z"][run], alone.z)
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [4, 100])
 def test_many_runs_at_once_are_those_alone(n: int) -> None:

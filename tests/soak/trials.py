@@ -118,9 +118,9 @@ class Draw:
         self.source = np.random.default_rng(key)
 
     def decades(self, low: float, high: float, size: int | None = None) -> Any:
-        """Return 10**u, u between low and high."""
-        u = 10.0 ** self.source.uniform(low, high, size)
-        return float(u) if size is None else u
+        """Return 10**u, u between low and high; NumPy's powers of arrays differ by processor."""
+        u = self.source.uniform(low, high, size)
+        return 10.0**u if size is None else np.array([10.0**each for each in u.tolist()])
 
     def chance(self, share: float) -> bool:
         """Return True with this probability."""

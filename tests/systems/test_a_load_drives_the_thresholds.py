@@ -36,6 +36,7 @@ def moved(model: Model, v: str, N: str | None = None, **signals: Any) -> System:
     )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", MODELS)
 def test_a_constant_load_is_a_factor_of_both_strengths(name: str) -> None:
     """N = 5 and a curve of five times the height: the same switches, forces and tolerances."""

@@ -94,6 +94,7 @@ def creep(name: str, **own: float) -> float:
     return float(np.diff(trace.x)[0])
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_it_does_not_drift_where_lugre_does() -> None:
     drift, elastic = creep("lugre"), creep("elasto-plastic", z_ba=9e-6)

@@ -133,6 +133,7 @@ STIFF: dict[str, tuple[dict[str, float], PulledSlider, dict[str, float], float, 
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "law"), [*zip(STIFF, 2 * LAWS, strict=True)])
 def test_radau_with_absolute_tolerances_follows_a_stiff_run(name: str, law: str) -> None:
