@@ -7,7 +7,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
-import scipy.integrate
 from pydantic import (
     AfterValidator,
     Discriminator,
@@ -20,13 +19,15 @@ from pydantic_core import PydanticKnownError
 
 from gms_fsm.errors import ScenarioError
 from gms_fsm.foundation.tables import LIST, ONE, TABLE, TEXT, Numbers, Table
-from gms_fsm.identification.problem.task import FitOptions
 from gms_fsm.records.record import Column, Record
 from gms_fsm.run.settings import ENGINES, EVENTS, Settings
 from gms_fsm.systems.files.model_tables import ModelTable
 from gms_fsm.systems.files.toml import SystemFile
 from gms_fsm.systems.rigs import Belt, PulledSlider
 from integrators import METHODS
+
+if TYPE_CHECKING:
+    from gms_fsm.identification.problem.task import FitOptions
 
 # Tags of union members in pydantic's errors; no key of a file looks like these.
 RAMPS = "<ramps>"
@@ -214,6 +215,8 @@ class RunTable(Table):
         """Return the given settings, by name."""
         given = self.model_dump(include={each.name for each in fields(_DEFAULT)}, exclude_none=True)
         if self.method in SCIPY_METHODS:
+            import scipy.integrate  # slow to import
+
             given["method"] = getattr(scipy.integrate, self.method)
         return given
 
@@ -303,6 +306,8 @@ class FitTable(Table):
 
     def options(self, smoothing: float | None) -> FitOptions:
         """Return the options of a fit, with the smoothing of the record."""
+        from gms_fsm.identification.problem.task import FitOptions  # imports SciPy
+
         given: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value
             for name, value in self

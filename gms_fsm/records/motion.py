@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import make_smoothing_spline
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import RecordError, cut, shown
@@ -168,6 +167,8 @@ def _smoothed(time: FloatArray, raw: FloatArray, weight: float) -> tuple[FloatAr
     """Return values and slopes of a smoothing spline through a stretch of rows."""
     if time.size < FEWEST:
         return raw, np.gradient(raw, time) if time.size > 1 else np.zeros(1)
+    from scipy.interpolate import make_smoothing_spline  # slow to import
+
     # The spline does not depend on the origin; subtracting the offset avoids cancellation.
     shift = float(raw[0])
     spline = make_smoothing_spline(time, raw - shift, lam=weight)

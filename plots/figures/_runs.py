@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.errors import ParameterError
+from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.traces.trace import Trace
 from plots import panels
 from plots.figures._layout import fitted, legend_above, low, narrow, sheet
@@ -64,6 +65,7 @@ class Measured:
             raise ParameterError("t of a measurement goes backward", advice="times must increase")
 
 
+@refusing()
 def overview(
     trace: Trace,
     measured: Measured | None = None,
@@ -93,6 +95,8 @@ def overview(
         On the left over time, on the right F against x and v.
     """
     check_trace(trace)
+    if measured is not None:
+        checked_kind("measured", measured, Measured, "a plots.figures.Measured")
     window = last_cycles(trace) if window is None else checked_window(trace, window)
     part = shown(trace, window)
     count = len(checked_elements(trace, elements))

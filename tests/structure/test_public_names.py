@@ -44,6 +44,13 @@ LOADED = {  # code, what it loads and what it does not
         "llvmlite",
         LARGE,
     ),
+    "command line": (
+        "from gms_fsm.app.cli import main; import sys; sys.argv[1:] = ['run', 'none.toml']\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass",
+        "typer pydantic",
+        "matplotlib pygraphviz pandas IPython scipy llvmlite",
+    ),
+    "pictures": ("import plots; plots.statechart", "plots gms_fsm", "matplotlib pandas llvmlite"),
     "files": (
         HEAD + "from gms_fsm import Trace; import os, tempfile; os.chdir(tempfile.mkdtemp())\n"
         'Trace.load(simulate(model, Prescribed("0.1*t"), 1.0).save("run.npz"))',
