@@ -30,6 +30,7 @@ def pulled(integrator: str = "Euler") -> tuple[Any, Any]:
     return model, data
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_it_is_a_stepping_friction_on_the_velocities_of_the_steps(integrator: str) -> None:
@@ -68,6 +69,7 @@ def test_the_force_is_what_mujoco_is_given() -> None:
         assert joints.forces["rail"] > 0.1
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("integrator", INTEGRATORS[1:])
 def test_a_reset_and_a_snapshot_with_the_state_of_mujoco_begin_again(integrator: str) -> None:

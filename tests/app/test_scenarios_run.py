@@ -85,6 +85,7 @@ def check_report(loaded: Loaded, trace: Trace, files: list[Path], *, drawn: bool
         assert "| element | stick [s] | slip [s] | break_away_forward |" in summary
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", sorted({*SHIPPED} - {"tribometer"}))
 def test_a_shipped_scenario_runs(name: str, tmp_path: Path) -> None:
     drawn = name in DRAWN

@@ -145,6 +145,7 @@ def test_units_are_made_of_base_units() -> None:
 
 
 # --------------------------------------------------------------------------- in FMPy
+@pytest.mark.every(2)
 @pytest.mark.parametrize("form", FORMATS)
 def test_it_steps_to_the_engine_s_bits_and_its_readme_is_a_program(
     form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

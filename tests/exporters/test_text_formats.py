@@ -16,6 +16,7 @@ from tests.corpus import LIGHT
 from tests.exporters.frictions import case, loaded
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_blark_parses_structured_text() -> None:
     blark = pytest.importorskip("blark")
@@ -67,6 +68,7 @@ def test_a_friction_that_reads_everything(form: str) -> None:
         assert "## What it does not do" in readme
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("form", ["c99", "js", "matlab", "modelica", "scxml", "st", "transitions"])
 def test_a_variable_starts_where_its_chart_says(form: str, tmp_path: Path) -> None:
     for start in (0.3125, 0.4375):

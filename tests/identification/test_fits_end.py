@@ -32,6 +32,7 @@ def _lag(rate: float, **options: Any) -> Any:
     return fit(record, ChartModel(chart, {"k": 1.0, "rate": rate}), free=("k", "rate"), **options)
 
 
+@pytest.mark.matrix
 def test_a_proposal_costs_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     lost = 0
     own = runs.Driver.run

@@ -355,6 +355,7 @@ def _pulled(m: float, F_c: float) -> System:
     )
 
 
+@pytest.mark.matrix
 def test_a_mass_and_its_friction_from_positions() -> None:
     t = np.linspace(0.0, 8.0, 401)
     run = simulate(_pulled(1.0, 1.0), 8.0, t_eval=t, rtol=1e-9)
@@ -368,6 +369,7 @@ def test_a_mass_and_its_friction_from_positions() -> None:
     assert isinstance(found.model, System)
 
 
+@pytest.mark.matrix
 def test_a_driven_system_is_the_model_on_the_record_and_asks_which_signal_drives() -> None:
     bodies = (Body("a", velocity="w", x="x_a", v="v_a"), Body("b", velocity="u", x="x_b", v="v_b"))
     pad = Contact("pad", START, v="v_a - v_b")

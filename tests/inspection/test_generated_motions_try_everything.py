@@ -92,6 +92,7 @@ def test_motions_keep_to_their_bounds() -> None:
     assert -0.01 <= min(values) < max(values) <= 0.02
 
 
+@pytest.mark.matrix
 def test_what_bounds_forbid_is_open() -> None:
     found = generate(charts()["backlash"], bounds={"v": (0.0, 1.0)})
     assert "touch_left from apart" in {each.what for each in found.open}

@@ -31,6 +31,7 @@ def tight(name):
     return simulate(*what, t_end, rtol=1e-12, atol=1e-15, engine=FASTEST)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("name", "solver"), CASES)
 def test_the_sequence_is_that_of_our_own_tight_run(name, solver):
     what, t_end, rtol, t_bound, z_bound = RUNS[name]

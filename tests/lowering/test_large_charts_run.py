@@ -40,6 +40,7 @@ def test_engines_agree_where_branches_are_halved() -> None:
         assert run.transitions.edge.tolist() == runs[0].transitions.edge.tolist()
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_ring_of_500_states_runs() -> None:
     states = tuple(State(f"s{i}", flow={"z": "v"}) for i in range(500))

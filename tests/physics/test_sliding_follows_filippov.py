@@ -267,6 +267,7 @@ def test_it_leaves_when_the_push_exceeds_a_side_and_arrests_below_the_threshold(
     assert (below.transitions.edge[0], below.t[-1]) == ("arrest", 5.0)
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_however_long_a_step_v_stays_on_the_surface() -> None:
     """Steps of Euler's method that are far too long for these stiff bristles.

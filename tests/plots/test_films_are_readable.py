@@ -117,6 +117,7 @@ def boxes(movie: Movie) -> list[tuple[str, Bbox]]:
     return [*found, ("the chart", Bbox.union(inside))]
 
 
+@pytest.mark.matrix
 def test_texts_have_room_for_one_and_for_many_elements(tmp_path: Path) -> None:
     def use(movie: Movie) -> None:
         held = movie.held()

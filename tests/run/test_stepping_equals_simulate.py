@@ -82,6 +82,7 @@ def differences(
     return "", 0 if trace is None else len(trace.transitions)
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("jumps", [False, True])
 def test_random_records(jumps: bool) -> None:

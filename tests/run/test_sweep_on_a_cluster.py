@@ -102,6 +102,7 @@ class Deadly(Executor):
         return self.cluster.submit(function, *a, **b)
 
 
+@pytest.mark.matrix
 @quiet
 def test_a_run_that_kills_every_worker_is_a_row_that_says_so(cluster: Any) -> None:
     pytest.importorskip("llvmlite", reason="needs the extra fast")
@@ -123,6 +124,7 @@ def test_a_run_that_kills_every_worker_is_a_row_that_says_so(cluster: Any) -> No
     assert again.transitions.tolist() == here.transitions.tolist()
 
 
+@pytest.mark.matrix
 @quiet
 def test_a_signal_that_cannot_be_sent_is_a_row_that_says_so(cluster: Any) -> None:
     lock = threading.Lock()

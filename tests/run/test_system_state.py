@@ -60,6 +60,7 @@ def moved(state: SystemState, start: int, stop: int) -> list[Any]:
     return found
 
 
+@pytest.mark.every(2)
 @engines
 def test_every_name_of_a_run_has_the_value_of_the_run(engine: str) -> None:
     state = SystemState(PUSHED, engine=engine)

@@ -105,6 +105,7 @@ def test_what_shrinks_is_compressed(array: Any, packed: bool, tmp_path: Path) ->
 
 
 # --------------------------------------------------------------------------- CSV
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_csv_is_written_part_by_part(tmp_path: Path) -> None:
     """All rows as text and as Python numbers took 30 MB for 20,000 rows, and 1.3 GB for 800,000."""
