@@ -11,8 +11,8 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing, unknown
+from gms_fsm.gradients.linear import Directions, Linear
 from gms_fsm.language import evaluate, parse_value
-from gms_fsm.linear._duals import Sloped, slope_of, with_slopes
 from gms_fsm.lowering.observing import armed
 from gms_fsm.lowering.program import Program, lower
 from gms_fsm.systems.given import several
@@ -157,6 +157,13 @@ def _inputs(system: System) -> tuple[str, ...]:
     return (*system.signals, *(name for each in system.sampled for name in each.updates))
 
 
+def _level(system: System, name: str) -> str:
+    """Return a name that is free, for the number that a signal is at one instant."""
+    while (name := f"{name}_") in system.names:
+        pass
+    return name
+
+
 def _value(system: System, name: str, t: float) -> float:
     """Return a signal at a time."""
     match signal := system.signals[name]:
@@ -191,79 +198,49 @@ class _Seeded:
     def of(
         cls, given: System, t: float, y: list[float], mode: list[int], chosen: tuple[str, ...]
     ) -> _Seeded:
-        """Run the generated functions once with dual numbers."""
-        now = {
-            name: Corners(np.array([t - 1.0, t + 1.0]), np.full(2, _value(given, name, t)), True)
-            for name in given.signals
-        }
-        system = replace(given, signals=now)
+        """Differentiate the rates and outputs by the state and by the inputs."""
+        level = {name: _level(given, name) for name in given.signals}
+        system = replace(
+            given,
+            signals=dict(level),
+            numbers={**given.numbers, **dict.fromkeys(level.values(), 1.0)},
+        )
         program = lower(system)
-        size, held = program.layout.y.size, program.held
-        seeds = size + len(chosen) + held
-        unit = np.eye(seeds)
-        signs = armed(program, t, y, mode)
-        shared, own, tables = (list[Any](part) for part in program.p)
         names, places = [*numbers_of(system)[0]], program.layout.y
-        point: list[Any] = [Sloped(u, unit[k]) for k, u in enumerate(y)]
-        for j, name in enumerate(chosen):
-            seed = unit[size + j]
-            if name in now:
-                k = 2 * [*now].index(name) + 1
-                tables[k] = [Sloped(float(now[name].values[0]), seed)]
-            elif name in system.numbers:
-                k = names.index(name)
-                shared[k] = Sloped(shared[k], seed)
+        for name, number in level.items():
+            program.p[0][names.index(number)] = _value(given, name, t)
+        size, seeds = places.size, places.size + len(chosen)
+        start, moved = np.eye(size, seeds), {}
+        for j, name in enumerate(chosen, size):
+            number = level.get(name, name)
+            if number in system.numbers:
+                moved[names.index(number)] = np.eye(seeds)[j]
             else:
-                k = places.index(name)
-                point[k] = Sloped(y[k], seed)
-        p = shared, own, tables
-        functions = with_slopes(program)
-        frozen = [Sloped(u, unit[size + len(chosen) + j]) for j, u in enumerate(signs)]
-        functions["follow"](t, point, mode, frozen, p)
-        dy: list[Any] = [0.0] * size
-        functions["flow"](t, point, mode, frozen, p, dy)
-        seen: list[Any] = [0.0] * program.layout.observed.size
-        functions["observe"](t, point, mode, frozen, p, seen)
-        rows = (np.array([slope_of(u, seeds) for u in each]) for each in (point, dy, seen))
-        made = cls(system, program, t, mode, chosen, *(np.reshape(u, (-1, seeds)) for u in rows))
-        return made._sliding(functions, point, p)
-
-    def _sliding(self, functions: Any, point: list[Any], p: Any) -> _Seeded:
-        """Return the same where signs of sliding surfaces follow from the state."""
-        size = self.program.layout.y.size
-        smooth = size + len(self.chosen)
-        flags = self.mode[self.program.layout.slides]
-        active = [c for c, flag in enumerate(flags) if flag]
-        rates, seen, fixed = self.dy, self.seen, self.y
+                start[places.index(name)] = np.eye(seeds)[j]
+        seeded = (*map(str, range(size)), *chosen)
+        linear = Linear(program, Directions(seeded, moved, {}, start, np.ones(seeds)))
+        still, point, signs = np.zeros(seeds), list(y), armed(program, t, y, mode)
+        _, fixed = linear.call("follow", (t, point, mode, signs, program.p), still, start)
+        _, dy = linear.flow(t, point, mode, signs, still, fixed)
+        seen = linear.observe(t, point, mode, fixed)
+        active = np.flatnonzero(mode[program.layout.slides]).tolist()
         if active:
-            signs = [self.program.surfaces.sign[c] for c in active]
-            if min(signs) < 0:
+            if min(program.surfaces.sign[c] for c in active) < 0:
                 raise ParameterError(
                     "the motion slides between two states of a chart",
                     place="t",
-                    value=self.t,
+                    value=t,
                     advice="choose an instant at which it does not",
                 )
-            normals = []
-            for c in active:
-                out: list[Any] = [0.0] * (size + 1)
-                functions["normal"](c, self.t, point, self.mode, p, out)
-                normals.append([float(getattr(u, "value", u)) for u in out[:size]])
-            n = np.array(normals)
-            columns = [smooth + k for k in signs]
-            # On the surface the rate of its value stays 0: that gives the signs.
-            change = -np.linalg.solve(n @ rates[:, columns], n @ rates)
-            change[:, columns] = 0.0
-            rates, seen = (each + each[:, columns] @ change for each in (rates, seen))
-            # What lies on it, as what a lock holds, is one state less for each surface.
+            # What lies on a surface, as what a lock holds, is one state less for each.
+            n = linear.along(t, point, mode, signs, still, fixed).N
             place = [int(np.argmax(np.abs(row))) for row in n]
             onto = np.eye(size)
             onto[place] = 0.0
             onto[place] = -np.linalg.solve(n[:, place], n @ onto)
             fixed = onto @ fixed
-            rates, seen = (_through(each, fixed, size) for each in (rates, seen))
-        y, dy, seen = (each[:, :smooth] for each in (fixed, rates, seen))
-        return replace(self, y=y, dy=dy, seen=seen)
+            dy, seen = (_through(each, fixed, size) for each in (dy, seen))
+        return cls(system, program, t, mode, chosen, fixed, dy, seen)
 
     # ------------------------------------------------------------------ what is left out
     def reduced(self) -> LinearSystem:
