@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm.analysis.energy import EnergyBalance, balance_of
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing
@@ -19,7 +21,7 @@ from gms_fsm.gradients.linear import Directions, Linear
 from gms_fsm.lowering.observing import armed
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.run.simulate import derived, simulated
+from gms_fsm.run.simulate import check_derivable, derived, simulated
 from gms_fsm.run.ticks import clocks_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted, mounted
@@ -79,6 +81,11 @@ class LimitCycle:
     iterations: int
     driven: bool
     states: FloatArray = field(repr=False)  # at the start
+
+    @cached_property
+    def energy(self) -> EnergyBalance:
+        """What one period takes, and from where."""
+        return balance_of(self.trace)
 
     @property
     def stable(self) -> bool:
@@ -155,6 +162,7 @@ def limit_cycle(
             **options,
         }
     chosen = Settings.of(settings, "limit_cycle", **options)
+    check_derivable(chosen)
     what = mounted(model, rig, chosen.held_period)
     if period is not None:
         period = checked_scalar("period", period, "> 0")

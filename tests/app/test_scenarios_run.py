@@ -174,6 +174,15 @@ def test_the_tribometer_explains_the_measurement_and_shows_its_loops(
         assert np.ptp(line.get_ydata()) == pytest.approx(4.8, abs=0.4)
 
 
+def test_a_cycle_is_searched_as_the_scenario_runs(gms_fsm: CommandLine) -> None:
+    few = gms_fsm("cycle", "bowed_string", "--set", "run.max_steps=10")
+    assert few.code == 2
+    assert "10 steps" in few.err
+    jumps = gms_fsm("cycle", "bowed_string", "--set", "run.events=step", "--set", "run.step=1e-4")
+    assert jumps.code == 2
+    assert "not located" in jumps.err
+
+
 # --------------------------------------------------------------------------- by name
 def test_scenarios_are_listed_with_their_titles(gms_fsm: CommandLine) -> None:
     rows = gms_fsm("run", "--list").out.splitlines()

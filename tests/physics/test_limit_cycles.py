@@ -39,6 +39,9 @@ def test_stick_slip_has_the_period_of_the_closed_form(rig):
     assert cycle.stable
     assert cycle.residual < 1e-10
     assert cycle.iterations <= 8
+    # It slips while it sticks nowhere else: over as much belt as has passed.
+    assert cycle.energy.contacts["friction"] == pytest.approx(F_C * V * period, rel=1e-10)
+    assert abs(cycle.energy.missing) < 1e-10 * cycle.energy.put_in
     assert sorted(edge.split("_")[0] for edge in cycle.trace.transitions.edge) == [
         "arrest",
         "release",
@@ -88,16 +91,24 @@ def test_hunting_of_a_controller_is_that_of_a_long_run():
     assert not cycle.driven
 
 
-def test_a_driven_motion_keeps_the_period_it_is_given():
+@pytest.mark.parametrize(
+    ("chart", "numbers"),
+    [
+        ("stiction", {"F_c": 0.5, "F_s": 0.7, "b": 0.2}),
+        ("end-stop", {"x_s": 0.05, "e": 0.6, "v_r": 1e-3}),
+    ],
+)
+def test_a_driven_motion_keeps_the_period_it_is_given(chart, numbers):
     pushed = System(
         "pushed",
         bodies=(Body("mass", inertia=1.0, force="3 * sin(2 * pi * t) - 20 * x - v"),),
-        contacts=(Contact("pad", CHARTS["stiction"], {"F_c": 0.5, "F_s": 0.7, "b": 0.2}),),
+        contacts=(Contact("pad", CHARTS[chart], numbers),),
     )
     cycle = limit_cycle(pushed, period=1.0)
     assert cycle.driven
     assert cycle.period == 1.0
     assert cycle.stable
+    assert abs(cycle.energy.missing) < 1e-9 * cycle.energy.put_in
     x = cycle.trace.body("mass").x
     assert abs(x[-1] - x[0]) < 1e-9 * np.abs(x).max()
 

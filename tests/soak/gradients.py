@@ -59,11 +59,12 @@ def look(given: Namespace, index: int) -> Iterator[Seen]:
         yield Seen(again, {f"{kind} stopped": 1}, note=str(error))
         return
     for each in found:
-        shown = [run.subject, each, *trace.trust().of("sensitivity")]
         well = each.known and each.noise < WELL * limit
         wrong = well and each.error > limit + 3.0 * each.noise
         word = "wrong" if wrong else "right" if well else "ill" if each.known else "none"
         counts = {f"{kind} {word}": 1, "switches": len(trace.firings) if well else 0}
+        shown = [run.subject, each]
+        shown += trace.trust().of("sensitivity") if given.index is not None else []
         yield Seen(again, counts, f"{kind}: {each}" if wrong else "", shown=shown)
 
 

@@ -29,6 +29,7 @@ from gms_fsm.foundation.files import write_text
 from gms_fsm.scenarios import shipped, titles
 
 SHOWN = 6  # multipliers
+CYCLE_RTOL = 1e-10  # of the runs that Newton's method compares, at most
 
 
 class EngineName(enum.StrEnum):
@@ -170,17 +171,18 @@ def cycle_command(
     overrides: Overrides = None,
 ) -> None:
     """Find the periodic motion that a scenario ends near, and say whether it is stable."""
-    from gms_fsm import Settings, limit_cycle, simulate
+    from gms_fsm import limit_cycle
     from gms_fsm.app.scenario import load_scenario
     from gms_fsm.foundation.extras import has_machine_code
 
     loaded = load_scenario(scenario, overrides or [])
-    how = {key: loaded.arguments[key] for key in ("t_start", "initial") if key in loaded.arguments}
-    given: Any = loaded.subject
-    engine = "compiled" if has_machine_code() else "ifelse"
-    settings = Settings(rtol=1e-8, engine=engine)
-    near = simulate(*given, settings=settings, **how)
-    found = limit_cycle(*given[:-1], near=near, period=period)
+    how = loaded.scenario.run.options()
+    if isinstance(how["method"], str) and has_machine_code():
+        how["engine"] = "compiled"
+    near = loaded.simulate(**how, output="all", t_eval=None, monitors=())
+    how["rtol"] = min(how["rtol"], CYCLE_RTOL)
+    with loaded.blaming():
+        found = limit_cycle(*loaded.subject[:-1], near=near, period=period, **how)
     word = "stable" if found.stable else "unstable"
     say(f"period      {found.period:.12g} s, {word}")
     for each in found.multipliers[:SHOWN]:
@@ -189,6 +191,10 @@ def cycle_command(
     if (more := len(found.multipliers) - SHOWN) > 0:
         say(f"            and {more} smaller ones")
     say(f"the state returns to {found.residual:.2g} of its size, after {found.iterations} runs")
+    energy = found.energy
+    say(f"put in      {energy.put_in:.6g} J")
+    for name, taken in (energy.contacts | energy.dampers).items():
+        say(f"taken       {taken:.6g} J by {name}")
     log, start = found.trace.transitions, float(found.trace.t[0])
     for t, edge in zip((log.t - start).tolist(), log.edge.tolist(), strict=True):
         say(f"{t:12.9g} s  {edge}")
