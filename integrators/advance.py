@@ -76,7 +76,7 @@ class RunPlan(NamedTuple):
     knots: Vector  # times that steps may not jump over
     relaxing: Vector  # relaxation times of the modes of each machine, one machine after another
     max_steps: int  # attempted steps in the whole run
-    impulses: list[int]  # for each edge: 1 if it is an impulse, 2 if it changes forces at once
+    kinds: list[int]  # of each edge what matters to others, see `integrators.switching.jolts`
     leaps: bool  # whether velocities that are given may jump at a crossing
     events: int  # the bit with which events are forgotten once all machines were asked; or 0
     lasting: int  # that with which, before they are, times of conditions that ceased end; or 0

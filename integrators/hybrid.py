@@ -53,6 +53,7 @@ from integrators.steps import (
     coefficients,
     stays,
 )
+from integrators.switching.jolts import TICK
 from integrators.tableaux import EULER, Tableau
 
 __all__ = [
@@ -128,9 +129,9 @@ class Equations:
         Number of values that `integrators.runners.columns.record` observes.
     follow : callable
         ``follow(t, y, mode, held, p)`` sets the components of y that others determine.
-    impulses : list of int
-        For each edge 1 if it changes the state far beyond rounding, 2 if it changes only what
-        guards read: others are asked again after both.
+    kinds : list of int
+        For each edge what matters to others (`IMPULSE`, `CHANGES_FORCES`, `TICK`, and `EVENT`
+        shifted by the number of the event that it waits for), as bits; empty if all are 0.
     velocities : int
         Number of values that `Switch.jolts` compares; 0 if nothing can be jolted.
     leaps : bool
@@ -158,7 +159,7 @@ class Equations:
     discrete: list[int] = field(default_factory=list)
     seen: int = 0
     follow: Callable[..., Any] = stays
-    impulses: list[int] = field(default_factory=list)
+    kinds: list[int] = field(default_factory=list)
     velocities: int = 0
     leaps: bool = False
     events: int = 0
@@ -424,7 +425,7 @@ def buffers(
             switches=[0] * n,
             changes=[0] * len(strict),
             anchor=list(y),
-            due=[0] * n,
+            heard=[TICK] * n,
             was=[0.0] * equations.velocities,
             jolt=[0] * n,
         ),
@@ -500,7 +501,7 @@ def plan_of(
         jumps=times,
         before_jumps=before,
         ticks=bits,
-        impulses=equations.impulses,
+        kinds=equations.kinds,
         leaps=equations.leaps,
         events=equations.events,
         lasting=equations.lasting,

@@ -30,13 +30,17 @@ from integrators.sliding import Functions, Held, Sliding, arm_on, margins_on, ot
 from integrators.step_size import INFINITY, error_norm, starting_step
 from integrators.steps import ArcMotion, Now, Scratch, Vector, time_of
 from integrators.switching.jolts import (
+    ALONE,
+    IMPULSE,
     JUMPED,
     LET_GO,
     arrived,
-    forget,
+    cut,
+    hear,
     jolted,
-    moves_a_lock,
+    marked,
     only_let_go,
+    only_new,
 )
 from integrators.switching.machines import Machines, Switching
 from integrators.switching.sliding_bounds import (
@@ -99,7 +103,7 @@ class Memory:
     switches: list[int]  # firings of each machine since the time `Now.anchor`
     changes: list[int]  # changes of each relation since that time
     anchor: Vector  # the state at that time
-    due: list[int]  # whether each discrete machine is to be asked
+    heard: list[int]  # the tick and the events that each machine has answered, as bits
     was: Vector  # velocities before this instant, where locks make them matter; else empty
     jolt: list[int]  # JUMPED or LET_GO for each machine whose velocity has changed at once
 
@@ -137,16 +141,19 @@ def run_to_event(
             if len(sliding.surfaces.rise) > 0 and left >= 0:
                 leave(on, now, relations, left)
                 return SLID
-            _only_due(plan, memory)
-            if plan.events > 0:
-                switch.tick(plan.events, now.t, now.y, now.mode, p)
             memory.machine = -1
             memory.fired_one = False
             memory.phase = PICK
+            whole = not marked(memory.jolt, LET_GO)
+            only_new(plan.kinds, memory.edges, memory.heard)
             if len(memory.was) > 0:
                 refused = only_let_go(plan.located, memory.edges, memory.jolt)
                 if refused >= 0:
                     _refuse(memory, refused, -2 - memory.edges[refused])
+            whole = cut(plan.located, plan.kinds, memory.edges) and whole
+            hear(whole, plan.kinds, memory.edges, memory.heard)
+            if plan.events > 0 and whole:
+                switch.tick(plan.events, now.t, now.y, now.mode, p)
         elif phase == PICK:
             event = _pick(plan, memory)
         elif phase == FIRE:
@@ -162,7 +169,8 @@ def run_to_event(
                 event = _held(now, memory, out)
             else:
                 if plan.located:
-                    forget(memory.jolt, 0)
+                    for i in range(len(memory.jolt)):
+                        memory.jolt[i] = 0
                 _choose_stop(plan, now, memory)
             if event == NOTHING and plan.located and memory.phase == BEGIN:
                 event = _rearm(plan, on, now, relations, memory)
@@ -264,17 +272,14 @@ def _refuse(memory: Memory, machine: int, edge: int) -> None:
 def _act(
     switch: Switching, on: Held, plan: RunPlan, now: Now, memory: Memory, relations: Watched
 ) -> None:
-    """Take an edge; after some, the others are asked again."""
+    """Take an edge."""
     edge, machine, p = memory.edge, memory.machine, on.functions.p
     look_back(on, now, relations)
     switch.act(edge, machine, time_of(now), now.y, now.mode, p)
     let_go(on, now, relations)
     crossed(on.sliding, machine, edge)
-    if len(plan.impulses) > 0 and plan.impulses[edge] > 0:
-        if len(memory.was) > 0 and plan.impulses[edge] == 1:
-            jolted(switch, now, memory.was, memory.jolt, p)
-        if plan.located:
-            forget(memory.edges, -1)
+    if len(memory.was) > 0 and len(plan.kinds) > 0 and plan.kinds[edge] & ALONE == IMPULSE:
+        jolted(switch, now, memory.was, memory.jolt, p)
 
 
 def _pick(plan: RunPlan, memory: Memory) -> int:
@@ -288,7 +293,7 @@ def _pick(plan: RunPlan, memory: Memory) -> int:
         memory.edge = edges[i]
         memory.phase = FIRE
         return FIRING
-    again = plan.located or moves_a_lock(memory.jolt)
+    again = plan.located or marked(memory.jolt, LET_GO) or marked(memory.heard, 0)
     memory.phase = ASK if memory.fired_one and again else SETTLED
     return NOTHING
 
@@ -461,22 +466,12 @@ def _end_arc(plan: RunPlan, now: Now, memory: Memory, often: bool) -> int:
     return NOTHING
 
 
-def _only_due(plan: RunPlan, memory: Memory) -> None:
-    """Forget the edges of discrete machines between their ticks; each is asked once at a tick."""
-    edges, due = memory.edges, memory.due
-    for i in range(len(edges)):
-        if plan.discrete[i] > 0:
-            if due[i] == 0:
-                edges[i] = -1
-            due[i] = 0
-
-
 def _make_due(plan: RunPlan, memory: Memory) -> None:
     """Let discrete machines be asked at the tick that has just come."""
     bits = plan.ticks[memory.jump]
-    for i in range(len(memory.due)):
+    for i in range(len(memory.heard)):
         if plan.discrete[i] & bits > 0:
-            memory.due[i] = 1
+            memory.heard[i] = 0
             memory.hold |= plan.discrete[i]
 
 

@@ -32,7 +32,7 @@ from integrators.runners.stepping import FULL_LOG
 Line = tuple[Any, Any]  # an input at the start and at the end of a sample
 ARGUMENTS = ("self", "v0", "v1", "dt")  # of `FrictionState.advance`
 # What the loop keeps only between two events at one time.
-TEMPORARY = ("cursor", "edges", "due")
+TEMPORARY = ("cursor", "edges", "heard")
 MOST = sys.float_info.max  # stands for infinity in arrays
 
 

@@ -36,7 +36,16 @@ import integrators
 from gms_fsm.charts.parameters import as_floats
 from gms_fsm.errors import ParameterError, SignalError, shown
 from gms_fsm.foundation.equality import ByIdentity
-from gms_fsm.language import Binary, Call, Comparison, Requirement, Value, rough_points, spell
+from gms_fsm.language import (
+    Binary,
+    Call,
+    Comparison,
+    Requirement,
+    Value,
+    names_in,
+    rough_points,
+    spell,
+)
 from gms_fsm.lowering.adapting import Adaptive, adaptive
 from gms_fsm.lowering.generated import SIGNALS, CarefulText, ieee, load, quickened
 from gms_fsm.lowering.layout import SystemLayout
@@ -44,6 +53,7 @@ from gms_fsm.lowering.printing.plan import Pair, ProgramPlan, both_sides, plan_o
 from gms_fsm.lowering.printing.python import FUNCTIONS, python
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import mounted
+from gms_fsm.systems.reading.assembly import Bank, ContactEdge
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (
@@ -53,7 +63,7 @@ from gms_fsm.systems.signals import (
     Signal,
 )
 from gms_fsm.systems.system import System
-from integrators import LIVE
+from integrators import CHANGES_FORCES, EVENT, IMPULSE, LIVE, MOST_EVENTS, TICK
 
 Arguments = tuple[list[float], list[list[float]], list[list[float]]]
 
@@ -95,8 +105,8 @@ class Program:
         What ticks when: the samplers, then the contacts with a period.
     discrete : list of int
         For each machine the bit of its contact if this has a period, else 0.
-    impulses : list of int
-        For each edge 1 if it is an impulse, 2 if it lets go of a lock, else 0; empty if all are 0.
+    kinds : list of int
+        For each edge what matters to others, as bits; see `integrators.Equations`.
     events : int
         The bit of a tick that forgets events; 0 if there are none.
     lasting : int
@@ -122,7 +132,7 @@ class Program:
     knots: list[float]
     jumps: list[float]
     discrete: list[int]
-    impulses: list[int]
+    kinds: list[int]
     velocities: int
     leaps: bool
     events: int = 0
@@ -289,7 +299,7 @@ def _names(callables: Mapping[str, Callable[[float], float]]) -> dict[str, Any]:
 def _jolts(plan: ProgramPlan) -> dict[str, Any]:
     """Return what a run has to know about impulses, and about velocities that jump."""
     read = plan.read
-    impulses = [bank.changes_others(edge) for bank in read.banks for edge in bank.edges]
+    kinds = [_kind(plan, bank, edge) for bank in read.banks for edge in bank.edges]
     held = [bank for bank in read.banks if bank.chart.locks or bank.chart.sets_velocity]
     velocities = [name for bank in held for name in bank.velocities]
     if not any(bank.chart.locks for bank in held):
@@ -298,10 +308,23 @@ def _jolts(plan: ProgramPlan) -> dict[str, Any]:
     behind = read.closure(read.closure(velocities) & given)
     trees = [read.defined[name].tree for name in behind if name in read.defined]
     return {
-        "impulses": impulses if any(impulses) else [],
+        "kinds": kinds if any(kinds) else [],
         "velocities": len(velocities),
         "leaps": any(tree is not None and bool([*rough_points(tree)]) for tree in trees),
     }
+
+
+def _kind(plan: ProgramPlan, bank: Bank, edge: ContactEdge) -> int:
+    """Return what matters to others about an edge, as bits."""
+    kind = TICK if bank.periodic else 0
+    if bank.is_impulse(edge):
+        kind |= IMPULSE
+    elif edge.source in bank.locked and not edge.locks:
+        kind |= CHANGES_FORCES
+    for k, event in enumerate(plan.read.system.events):
+        if event in names_in(edge.guard):
+            kind |= EVENT << min(k, MOST_EVENTS - 1)
+    return kind
 
 
 def arguments(system: System) -> Arguments:
@@ -336,7 +359,7 @@ def equations(program: Program) -> integrators.Equations:
         discrete=program.discrete,
         seen=program.layout.observed.size,
         follow=functions["follow"],
-        impulses=program.impulses,
+        kinds=program.kinds,
         velocities=program.velocities,
         leaps=program.leaps,
         events=program.events,

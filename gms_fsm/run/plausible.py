@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.run.problem import Problem
-from integrators import FOR_A_GUARD, FOR_A_SIGN, LET_GO, WAITING, hybrid, loop
+from integrators import (
+    EVENT,
+    FOR_A_GUARD,
+    FOR_A_SIGN,
+    LET_GO,
+    MOST_EVENTS,
+    WAITING,
+    hybrid,
+    loop,
+)
 from integrators.runners import states
 
 
@@ -46,7 +55,7 @@ def bounds_of(start: Problem, b: hybrid.Buffers, t_end: float = np.inf) -> dict[
         "room": (0, relations - 1),
         "watch": (0, FOR_A_SIGN | FOR_A_GUARD | WAITING),
         "truth": (0, 1),
-        "due": (0, 1),
+        "heard": (0, (EVENT << MOST_EVENTS) - 1),
         "jolt": (0, LET_GO),
         "counts": _bounds(
             states.COUNTS,

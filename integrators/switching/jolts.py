@@ -13,6 +13,11 @@ from integrators.steps import Now, Vector, time_of
 
 # The marks. LET_GO: what held the velocity does not.
 JUMPED, LET_GO = 1, 2
+# The kinds of an edge, as bits. The others are asked again after an impulse, or once forces have
+# changed. Some wait for their machine's tick, or from EVENT on for an event each.
+IMPULSE, CHANGES_FORCES, TICK, EVENT = 1, 2, 4, 8
+ALONE = IMPULSE | CHANGES_FORCES
+MOST_EVENTS = 27  # that are told apart, since bits are those of a whole number in any language
 
 
 def only_let_go(located: bool, edges: list[int], jolt: list[int]) -> int:
@@ -20,7 +25,7 @@ def only_let_go(located: bool, edges: list[int], jolt: list[int]) -> int:
 
     What the others read depends on those. If crossings are not located, marks last for one set.
     """
-    moved = moves_a_lock(jolt)
+    moved = marked(jolt, LET_GO)
     refused = -1
     for i in range(len(edges)):
         if moved and jolt[i] != LET_GO:
@@ -32,12 +37,42 @@ def only_let_go(located: bool, edges: list[int], jolt: list[int]) -> int:
     return refused
 
 
-def moves_a_lock(jolt: list[int]) -> bool:
-    """Return whether a lock is to let go."""
+def marked(marks: list[int], mark: int) -> bool:
+    """Return whether a machine has a mark."""
     found = False
-    for i in range(len(jolt)):
-        found = found or jolt[i] == LET_GO
+    for i in range(len(marks)):
+        found = found or marks[i] == mark
     return found
+
+
+def only_new(kinds: list[int], edges: list[int], heard: list[int]) -> None:
+    """Drop edges that wait for a tick, or an event, which their machine has answered."""
+    for i in range(len(edges)):
+        edge = max(edges[i], -2 - edges[i])  # one that is refused, too
+        if len(kinds) > 0 and edge >= 0 and kinds[edge] & heard[i] > 0:
+            edges[i] = -1
+
+
+def cut(located: bool, kinds: list[int], edges: list[int]) -> bool:
+    """Drop the edges behind one after which all are asked again; return whether none waited."""
+    alone, whole = False, True
+    for i in range(len(edges)):
+        if len(kinds) > 0 and edges[i] >= 0:
+            kind = kinds[edges[i]]
+            if alone:
+                whole = whole and kind < TICK
+                edges[i] = -1
+            alone = alone or (located and kind & ALONE > 0)
+    return whole
+
+
+def hear(whole: bool, kinds: list[int], edges: list[int], heard: list[int]) -> None:
+    """Store who has answered: whoever had no turn, as others go first, hears it once more."""
+    for i in range(len(edges)):
+        if whole:
+            heard[i] = TICK
+        elif edges[i] >= 0 and len(kinds) > 0:
+            heard[i] |= kinds[edges[i]]
 
 
 def jolted(switch: Any, now: Now, was: Vector, jolt: list[int], p: Any) -> None:
@@ -57,9 +92,3 @@ def arrived(
         switch.jolts(t, now.y, now.mode, p, now.floor, 1, was, jolt)
     else:
         switch.jolts(t, now.y, now.mode, p, now.floor, 0, was, jolt)
-
-
-def forget(marks: list[int], none: int) -> None:
-    """Set all marks to what stands for none."""
-    for i in range(len(marks)):
-        marks[i] = none

@@ -204,6 +204,50 @@ def test_a_bank_sends_an_event_to_all_joints_that_wait_for_it() -> None:
     assert [states[0] for states in bank.states] == ["oiled", "stick", "oiled"]
 
 
+@pytest.mark.parametrize("engine", sorted({FASTEST, "ifelse"}))
+def test_nobody_misses_an_event_or_a_tick_while_others_go_first(engine: str) -> None:
+    """They do after an impulse, and where a lock lets go."""
+
+    def counter(event: str | None) -> Chart:
+        count = Transition("count", "on", "on", "k >= 0", event=event, actions={"k": "k + 1"})
+        return Chart("counter", (), ("k",), (), (State("on"),), (count,), velocities=())
+
+    kicked = Chart(
+        "kicked",
+        ("v",),
+        states=(State("on", outputs={"F": "0"}),),
+        transitions=(
+            Transition("kick", "on", "on", event="go", actions={"v": "v + 1"}, emit="kicked"),
+        ),
+    )
+    system = System(
+        "kicked",
+        bodies=(
+            Body("mass", inertia=1.0, x="xm", v="vm"),
+            Body("belt", velocity="u", x="xb", v="vb"),
+        ),
+        contacts=(
+            Contact("one", kicked, v="vm"),
+            Contact("two", kicked, v="vm"),
+            Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.0}, v="vm - vb"),
+        ),
+        supervisors=(
+            Supervisor("hand", timetable({"go": 0.7})),
+            Supervisor("goes", counter("go")),
+            Supervisor("kicks", counter("kicked")),
+            Supervisor("ticks", counter(None), period=0.25),
+        ),
+        signals={"u": ([0.0, 0.25, 0.25, 1.0], [0.0, 0.0, 0.05, 0.05])},
+    )
+    log = simulate(system, 0.9, engine=engine).transitions
+    at = [(round(t, 9), name) for t, name in zip(log.t, log.contact, strict=True)]
+    assert at == [
+        *((0.0, "ticks"), (0.25, "pad"), (0.25, "ticks"), (0.3, "pad"), (0.5, "ticks")),
+        *((0.7, "hand"), (0.7, "one"), (0.7, "pad"), (0.7, "two"), (0.7, "goes")),
+        *((0.7, "kicks"), (0.75, "ticks")),
+    ]
+
+
 def test_a_timetable_with_a_period_sends_at_its_ticks() -> None:
     hand = Supervisor("hand", timetable({"oil": 1.0}), period=0.3)
     log = simulate(System("by hand", supervisors=(hand,)), 3.0).transitions

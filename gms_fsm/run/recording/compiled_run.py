@@ -502,11 +502,11 @@ def example_of(start: Problem, counting: Counting | None = None) -> RecordArgume
 def _as_arrays(plan: Any, places: Any) -> Any:
     """Return a plan whose lists are arrays, those inside the block in their places."""
     places.control.atol[:], places.discrete[:] = plan.control.atol, plan.discrete
-    places.impulses[:] = plan.impulses
+    places.kinds[:] = plan.kinds
     jumps = len(plan.jumps) > 0
     places.relaxing[:] = plan.relaxing
     return plan._replace(
-        impulses=places.impulses,
+        kinds=places.kinds,
         control=plan.control._replace(atol=places.control.atol),
         discrete=places.discrete,
         relaxing=places.relaxing,

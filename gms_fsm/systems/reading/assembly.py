@@ -137,12 +137,6 @@ class Bank:
         sets = any(name in self.velocities for name, _ in edge.steps)
         return sets or (edge.locks and not edge.arrests and edge.source not in self.locked)
 
-    def changes_others(self, edge: ContactEdge) -> int:
-        """Return 1 for an impulse, 2 for an edge that lets go of a lock: forces change at once."""
-        if self.is_impulse(edge):
-            return 1
-        return 2 if edge.source in self.locked and not edge.locks else 0
-
     @property
     def weight(self) -> str:
         """Name of the weights, of which every bank has one per element."""
