@@ -349,3 +349,12 @@ def test_a_belt_that_turns_at_once_leaves_what_it_carries_behind(off: float) -> 
     assert found.edge.tolist() == names
     times = np.array([0.25, 0.25, 0.75, 0.75]) * np.pi + [0.0, 1.0, 0.0, 1.0]
     np.testing.assert_allclose(found.t, times, rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("velocity", ["max(0, t - 1)", "max(0, sin(t - 101))"])
+def test_a_belt_that_starts_gently_takes_along_what_it_carries(velocity: str) -> None:
+    """It needs 1 N; where the start is located, a few clock ticks late, the belt moves already."""
+    trace = run(on_a_belt(velocity), 1.5)
+    assert len(trace.transitions) == 0
+    np.testing.assert_allclose(trace.body("cart").v, trace.body("belt").v, atol=1e-14)
+    assert trace.body("cart").v[-1] > 0.4
