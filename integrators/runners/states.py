@@ -27,6 +27,7 @@ def state_of(b: Buffers) -> dict[str, Any]:
         "room": w.room,
         "truth": w.truth,
         "start": w.start,
+        "above": w.above,
         "cursor": numbers_in(b.out, CURSOR),
         "slid": s.flags,
         "arrived": s.arrived,

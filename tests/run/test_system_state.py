@@ -108,8 +108,13 @@ def test_looking_ahead_changes_nothing(engine: str) -> None:
     state, other = SystemState(PUSHED, engine=engine), SystemState(PUSHED, engine=engine)
     for each in (state, other):
         moved(each, 1, 6)
+    relations = state._plant.memory.buffers.relations
+    above = [*relations.above]
     seen = state.peek(0.1, "x", "pad.F", u=(8.0, 0.0))
     assert (state.t, state.switches) == (other.t, other.switches)
+    relations.above[:] = [1.0] * len(above)  # of motions along a surface, where it turns
+    state.restore(other.snapshot())
+    assert [*relations.above] == above
     state.advance(0.1, u=(8.0, 0.0))
     assert seen == (state.value("x"), state.value("pad.F"))
     other.advance(0.1, u=(8.0, 0.0))
