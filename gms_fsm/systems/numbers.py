@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gms_fsm.charts.constants import named_constants
 from gms_fsm.charts.gms import GMS_ELEMENT
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter, adapted
 from gms_fsm.errors import ParameterError
@@ -231,6 +232,25 @@ def joined(what: Mounted, parts: Iterable[tuple[str, int | None, float]]) -> dic
             found[name] = np.broadcast_to(present, names[name][1]).copy()
         found[name][element] = each
     return found
+
+
+# --------------------------------------------------------------------------- numbers in guards
+def with_named_constants(what: Mounted) -> tuple[Mounted, frozenset[str]]:
+    """Return the same with parameters in place of the numbers in guards, and their names."""
+    names: set[str] = set()
+
+    def named(each: Contact) -> Contact:
+        chart, more = named_constants(each.chart)
+        fields: Any = {"chart": chart, "values": {**each.values, **more}}
+        if not more or not isinstance(each.model, ChartModel | None):
+            return each
+        names.update(what.of(each.name, name) for name in more)
+        if each.model is None:
+            return each.replaced(**fields)
+        return each.with_model(replace(each.model, **fields))
+
+    machines = tuple(map(named, what.system.machines))
+    return (_remade(what, machines, {}) if names else what), frozenset(names)
 
 
 # --------------------------------------------------------------------------- the slip law

@@ -26,6 +26,7 @@ from gms_fsm.run.problem import ROUNDING, Problem
 from gms_fsm.run.settings import SettingOptions, Settings
 from gms_fsm.run.simulate import simulate
 from gms_fsm.session.session import Session
+from gms_fsm.session.tree.branches import Tree
 from gms_fsm.session.tree.export import save_scenario
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted
@@ -39,6 +40,7 @@ from gms_fsm.systems.numbers import (
     numbers_of,
     with_elements,
     with_law,
+    with_named_constants,
 )
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
@@ -76,7 +78,8 @@ def play(
     """Make a live page: a run that the page computes again when a slider moves.
 
     It is the replay page, with an engine: the run has the bits of `gms_fsm.simulate`. The run as it
-    was written stays behind the present one, and their first difference is named.
+    was written stays behind the present one, and their first difference is named. Numbers in guards
+    can be changed, too: that of ``v > 0.3`` on the edge ``opens`` is called ``opens_at`` there.
 
     Parameters
     ----------
@@ -86,7 +89,7 @@ def play(
         The sliders that are shown first, by the names of the numbers, with their lowest and highest
         values: ``{"F_s": (0.5, 3.0), "k2": None}``; None is a decade around the value. In a system
         ``{"numbers.m": (0.5, 2.0), "pad.F_s": None}``. By default all numbers but those of single
-        elements.
+        elements and those of guards.
     title : str, optional
         Of the page; by default what runs.
     t_start, initial, settings, **options
@@ -119,6 +122,10 @@ def play(
     options.pop("t_eval", None)
     more: Any = {"t_start": t_start, "initial": initial, "settings": settings}
     tree = Session(model, rig, t_end, **more, **options).tree
+    start = tree.branch().start
+    what, hidden = with_named_constants(start.what)
+    if hidden:
+        tree = Tree(what, start.t_end, start.t_start, start.initial, start.chosen)
     start, trace = tree.branch().start, tree.trace(0)
     engine = live_engine(start, trace.title)
     variants = [start, *(_variants(start) if len(engine.text) < LARGE else ())]
@@ -129,7 +136,7 @@ def play(
     parts = zip(data["runs"], traces, variants, engines, strict=True)
     data["live"] = {
         "still": ROUNDING,
-        "variants": [_variant(*each, given, plane, data["title"]) for each in parts],
+        "variants": [_variant(*each, given, hidden, plane, data["title"]) for each in parts],
     }
     data["runs"] = []
     texts = ",\n".join(each.text for each in engines)
@@ -172,6 +179,7 @@ def _variant(
     start: Problem,
     engine: LiveEngine,
     vary: Mapping[str, Ends | None],
+    hidden: frozenset[str],
     planes: Mapping[str, Any],
     title: str,
 ) -> dict[str, Any]:
@@ -184,7 +192,7 @@ def _variant(
         "run": run,
         "law": law_of(what),
         "elements": elements_of(what),
-        "numbers": _numbers(what, engine, _ranges(what, vary)),
+        "numbers": _numbers(what, engine, _ranges(what, vary), hidden),
         "engine": engine.numbers,
         "velocities": [layout.y.index(b.v) for b in start.system.bodies if not b.driven],
         "masses": _masses(start),
@@ -213,7 +221,9 @@ def _ranges(what: Mounted, vary: Mapping[str, Ends | None]) -> dict[str, Ends]:
     return found | {name: usual_range(number_of(what, name)) for name in usual}
 
 
-def _numbers(what: Mounted, engine: LiveEngine, vary: Mapping[str, Ends]) -> list[dict[str, Any]]:
+def _numbers(
+    what: Mounted, engine: LiveEngine, vary: Mapping[str, Ends], hidden: frozenset[str]
+) -> list[dict[str, Any]]:
     """Return the numbers that the page can change, those to be shown first with ``first``."""
     every = {name: each for name, each in numbers_of(what).items() if name in engine.numbers}
     for name in vary:
@@ -223,7 +233,7 @@ def _numbers(what: Mounted, engine: LiveEngine, vary: Mapping[str, Ends]) -> lis
                 place=f"vary[{name!r}]",
                 value=numbers_of(what)[name].value,
             )
-    plain = [name for name, each in every.items() if each.element is None]
+    plain = [name for name, each in every.items() if each.element is None and name not in hidden]
     first = [*vary] or plain or [*every]
     order = [*first, *(name for name in every if name not in first)]
     made = [_number(every[name], vary.get(name), name in first) for name in order]

@@ -12,11 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gms_fsm import Chart, PulledSlider, State, Transition, simulate
 from gms_fsm.app.scenario import load_scenario
 from gms_fsm.errors import ParameterError
+from gms_fsm.systems.models import ChartModel
 from gms_fsm.systems.numbers import numbers_of, with_elements, with_law
 from plots.page._rows import PageRows
 from plots.page._run import stored_run, views_of
+from plots.page.live import play
+from tests.helpers import FASTEST
 from tests.plots.browser import SIZES, Open, browser, faults, open_page, said, wait
 from tests.plots.live_pages import FOUND, differing, live_scenario
 from tests.plots.stored import column
@@ -344,6 +348,31 @@ def test_thresholds_masses_and_numbers_of_guards_are_changed_in_the_picture(live
     assert page.evaluate("dials.get('v_c').value") == 2e-6
     wait(page, "!frameAsked && !live.busy")
     assert page.evaluate("runs[0].contacts[0].parameters.v_c") == 2e-6
+
+
+def test_numbers_in_guards_are_changed_as_parameters_are(open_page: Open, tmp_path: Path) -> None:
+    def started(tears: float, wait: float) -> tuple[ChartModel, PulledSlider, float]:
+        edges = (
+            Transition("tears", "holds", "torn", f"abs(z) > {tears}"),
+            Transition("closes", "torn", "holds", f"abs(v) < 0.25 and after({wait}) and v**2 > 0"),
+        )
+        states = State("holds", flow={"z": "v"}), State("torn", flow={"z": "-10 * z"})
+        velcro = Chart("velcro", ("v",), ("z",), ("k",), states, edges, {"F": "k * z"})
+        return ChartModel(velcro, {"k": 100.0}), PulledSlider(1.0, 2.0, 0.1), 20.0
+
+    page = open_page(play(*started(0.03, 0.2)).save(tmp_path / "page.html"))
+    wait(page, "typeof runs === 'object' && document.querySelector('#took').textContent !== ''")
+    hidden = page.evaluate("variant().numbers.flatMap((u) => u.first ? [] : [[u.name, u.unit]])")
+    assert hidden == [["tears_at", "m"], ["closes_at", "m/s"], ["closes_at_2", "s"]]
+    box = page.get_by_label("tears_at in this guard").first
+    box.fill("50 mm")
+    box.press("Enter")
+    assert page.evaluate("dials.get('tears_at').value") == 0.05
+    found = page.evaluate(FOUND, [{}, {"tears_at": 0.04, "closes_at_2": 0.1}])
+    for each, numbers in zip(found, [(0.03, 0.2), (0.04, 0.1)], strict=True):
+        bad, count = differing(each, simulate(*started(*numbers), engine=FASTEST))
+        assert bad == 0
+        assert count > 1000
 
 
 def test_a_sweep_of_another_contact_has_its_quantities(live: Any) -> None:
