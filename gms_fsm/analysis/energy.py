@@ -30,7 +30,8 @@ class EnergyBalance:
         J: the work of the forces on the bodies, and of what drives bodies and moves the ends of
         springs.
     contacts, dampers : dict of str to float
-        J: what each contact takes, with its impulses, and what the damper of each spring takes.
+        J: what each contact takes, with its impulses, and what the damper of each spring takes. On
+        a `gms_fsm.Belt` motions are those over the belt, also for the damper.
 
     Examples
     --------

@@ -43,6 +43,11 @@ COMPUTED: dict[int, tuple[float | str, ...]] = {
     10: ("lugre", "gms-published", "gms-signed"),
     11: ("weights2", math.sqrt(1.95 / 0.05), 2 / 0.5),
     12: (2, 0, 1, "copy"),
+    13: (
+        math.sqrt(8713 / 1.14e-3) / (2 * math.pi),
+        0.15 / math.sqrt(8713 / 1.14e-3) * 1e6,
+        "lower",
+    ),
 }
 GUESSED: dict[int, tuple[float | str, ...]] = {
     0: (15, "off", 15),
@@ -58,6 +63,7 @@ GUESSED: dict[int, tuple[float | str, ...]] = {
     10: ("stiction", "lugre", "elasto-plastic"),
     11: ("k2", 39, 1),
     12: (3, 1, 2, "both"),
+    13: (220, 150, "same"),
 }
 Ran = Callable[[int], Result]
 SLOW = sorted({*LESSONS} - {0, 1, 9})

@@ -26,6 +26,7 @@ from gms_fsm.app.lessons.practice import l9_contacts as l9
 from gms_fsm.app.lessons.practice import l10_which_model as l10
 from gms_fsm.app.lessons.practice import l11_what_a_record_tells as l11
 from gms_fsm.app.lessons.practice import l12_what_runs_have_not_tried as l12
+from gms_fsm.app.lessons.practice import l13_violin as l13
 from gms_fsm.phenomena.specimens import bench_bank
 
 pytestmark = pytest.mark.slow  # they share the runs
@@ -529,3 +530,12 @@ def test_only_between_the_two_speeds_the_copy_slips_alone(share: float) -> None:
     original, copy = (len(each.transitions) for each in l12.begun(share * l12.V_C).values())
     assert bool(original) == (share < -1.0)
     assert bool(copy) == (share < 1.0)
+
+
+# ------------------------------------------------------------------ 13: the violin
+def test_what_the_bow_puts_in_is_what_the_damping_takes(ran: Ran) -> None:
+    r = ran(13)
+    damped = l13.DAMPING * r.v**2
+    close(np.sum(0.5 * (damped[1:] + damped[:-1]) * np.diff(r.fine.t)), r.sound, rtol=0.01)
+    assert r.cycle.stable
+    assert r.pitches == sorted(r.pitches, reverse=True)
