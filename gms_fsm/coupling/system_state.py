@@ -220,22 +220,17 @@ class SystemState:
 
     def _lines(self, inputs: Mapping[str, Any]) -> tuple[list[float], list[float]]:
         """Return the inputs at the start and at the end of a sample, or refuse them."""
-        first, last = list[float](), list[float]()
         try:
-            for name in self._names:
-                given = inputs[name]
-                if type(given) is float and given - given == 0.0:  # finite
-                    first.append(given)
-                    last.append(given)
-                else:
-                    start, end = _line(name, given)
-                    first.append(start)
-                    last.append(end)
+            held = [inputs[name] for name in self._names]
         except KeyError:
             raise self._others(inputs) from None
-        if len(inputs) != len(first):
+        if len(inputs) != len(held):
             raise self._others(inputs)
-        return first, last
+        for given in held:
+            if type(given) is not float or given - given != 0.0:  # not finite
+                lines = [*map(_line, self._names, held)]
+                return [start for start, _ in lines], [end for _, end in lines]
+        return held, held
 
     def _others(self, inputs: Mapping[str, Any]) -> ParameterError:
         names = self._names
