@@ -105,22 +105,23 @@ def _calls(program: Program) -> list[Callable[[float], float]]:
 
 def functions(program: Program) -> Mapping[str, Any]:
     """Return a program's functions in the form that is translated to machine code."""
-    return _loaded(program.source, tuple(program.callables))
+    return _loaded(program.plan.title, program.source, tuple(program.callables))
 
 
 def count_of(program: Program, counting: Counting) -> Callable[..., Any]:
     """Return the function that counts rows, in the form that is translated to machine code."""
-    made: Callable[..., Any] = _loaded(counting.source, tuple(program.callables))["count"]
+    callables = tuple(program.callables)
+    made: Callable[..., Any] = _loaded("counted rows", counting.source, callables)["count"]
     return made
 
 
 @functools.lru_cache(maxsize=64)
-def _loaded(source: str, callables: tuple[str, ...]) -> dict[str, Any]:
+def _loaded(title: str, source: str, callables: tuple[str, ...]) -> dict[str, Any]:
     from integrators.machine_code.front_end.translate import HostFunction
 
     names: dict[str, Any] = {**SIGNALS, "__name__": __name__}
     names |= {f"{name}_signal": HostFunction(k) for k, name in enumerate(callables)}
-    return load("compiled program", source, names)
+    return load(title, source, names)
 
 
 @functools.cache

@@ -6,13 +6,15 @@ lengths of all arrays, unless they are long. An object is compiled once and stor
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
+import gc
 import hashlib
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from types import CodeType, FunctionType
 from typing import Any, NamedTuple, Protocol
@@ -286,14 +288,27 @@ def _object(
             return content
         started = time.perf_counter()
         notify("compiling, once for each chart and method ...")
-        translator = translated(layout, entries, each=each)
-        hot = {name for name, own in translator.origins.items() if own in HOT}
-        made = llvm_text(translator.module)
+        with _no_collections():
+            translator = translated(layout, entries, each=each)
+            hot = {name for name, own in translator.origins.items() if own in HOT}
+            made = llvm_text(translator.module)
         content = objects.compiled_at_once(made) if at_once else objects.compiled(made, hot)
         if store is not None:
             store.put(name, content)
         notify(f"compiled in {time.perf_counter() - started:.1f} s")
     return content
+
+
+@contextlib.contextmanager
+def _no_collections() -> Iterator[None]:
+    """Let nobody look for garbage: all trees of a translation stay, and to walk them takes long."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def translated(

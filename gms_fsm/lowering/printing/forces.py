@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
 from typing import Literal, TypeAlias
 
 from gms_fsm.language import Name, names_in
@@ -79,12 +80,17 @@ class ForceWriter(ProgramWriter):
     def late_definitions(self, made: set[str], signs: Signs) -> list[CodeLine]:
         """Write what is computed from what machines give out, as far as that is known."""
         lines: list[CodeLine] = []
-        for each in self.read.definitions:
-            needs = self.read.closure([each.name]) & self.late
-            if each.name in self.late - made and needs <= made | {each.name}:
-                lines += self.defined(each.name, signs)
-                made.add(each.name)
+        for name, needs in self.late_needs.items():
+            if name not in made and needs <= made:
+                lines += self.defined(name, signs)
+                made.add(name)
         return lines
+
+    @cached_property
+    def late_needs(self) -> Mapping[str, frozenset[str]]:
+        """By name what is known late among what its definition follows from."""
+        names = [each.name for each in self.read.definitions if each.name in self.late]
+        return {name: (self.read.closure([name]) & self.late) - {name} for name in names}
 
     def bank_forces(
         self,

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 from gms_fsm.language import (
@@ -226,10 +227,16 @@ class ProgramWriter(ABC):
             name = waiting.pop()
             if name not in found:
                 found.add(name)
-                if (value := self.plan.definitions.get(name)) is not None:
-                    waiting += computed_names(value.tree)
-                    waiting += (n for call in value.calls for n in computed_names(call.call))
+                waiting += self.needs.get(name, ())
         return frozenset(found)
+
+    @cached_property
+    def needs(self) -> Mapping[str, frozenset[str]]:
+        """By name what its definition reads."""
+        return {
+            name: computed_names(value.tree).union(*(computed_names(u.call) for u in value.calls))
+            for name, value in self.plan.definitions.items()
+        }
 
     def loop(
         self,
@@ -274,25 +281,23 @@ class ProgramWriter(ABC):
 
     def lazily(self, lines: list[CodeLine]) -> list[CodeLine]:
         """Let what takes long be computed in these lines, which may not be reached."""
-        names = [
-            name
-            for name in self.read.defined
-            if name in self.closure(reads_of(lines)) and self.takes_long(name)
-        ]
+        needed = self.closure(reads_of(lines)) & self.long
+        names = [name for name in self.read.defined if name in needed] if needed else []
         if not names:
             return lines
         without = [line._replace(reads=line.reads - {*names}) for line in lines]
         return [*(CodeLine("", lazy=name) for name in names), *without]
 
-    def takes_long(self, name: str) -> bool:
-        """Return whether a shared quantity contains a function such as exp or a power."""
-        if name in self.late or name in self.read.owner or name not in self.plan.definitions:
-            return False
-        value = self.plan.definitions[name]
-        return not value.calls and any(
-            (isinstance(part, Call) and part.function not in QUICK)
-            or (isinstance(part, Binary) and part.op == "**")
+    @cached_property
+    def long(self) -> frozenset[str]:
+        """The shared quantities that contain a function such as exp or a power."""
+        return frozenset(
+            name
+            for name, value in self.plan.definitions.items()
+            if name not in self.late and name not in self.read.owner and not value.calls
             for part in walk(value.tree)
+            if (isinstance(part, Call) and part.function not in QUICK)
+            or (isinstance(part, Binary) and part.op == "**")
         )
 
     def own(self, bank: int, reads: frozenset[str]) -> frozenset[str]:

@@ -33,7 +33,6 @@ from gms_fsm.lowering.layout import SystemLayout, sizes_of
 from gms_fsm.lowering.places import ElementPlaces, Places
 from gms_fsm.lowering.printing.names import QuantityNames, names_of
 from gms_fsm.systems.reading.assembly import ONE, Assembly, Bank, of
-from gms_fsm.systems.reading.order import read_by
 from gms_fsm.systems.signals import Corners, Function
 
 
@@ -582,7 +581,7 @@ def _read_elsewhere(read: Assembly) -> frozenset[str]:
     found = read.closure(name for tree in trees for name in names_in(tree))
     flows = (tree for bank in read.banks for tree in bank.flows.values())
     found |= read.closure(name for tree in flows for name in names_in(tree))
-    return found.union(*(read_by(read, bank) for bank in read.banks))
+    return found.union(*read.inputs)
 
 
 def gradient_of(u: Value, read: Assembly) -> Gradient:

@@ -521,9 +521,7 @@ class _PythonPrinter(LockFunctions):
         bank = self.read.bank_of(Binary("-", comparison.left, comparison.right))
         if bank is not None:  # what takes long, and what is computed from it
             own = self.own(bank, reads)
-            inside = frozenset(
-                name for name in own if any(map(self.takes_long, self.closure(frozenset({name}))))
-            )
+            inside = frozenset(name for name in own if self.closure(frozenset({name})) & self.long)
             made = self.element(bank, inside, "live")
             seen = {self.local(name) for name in self.closure(inside) & (own - inside)}
             inner = [line for line in made if line.text.split(" =")[0] not in seen] + inner

@@ -31,7 +31,7 @@ from gms_fsm.language.normal import chosen, renamed_in
 from gms_fsm.systems.given import coefficients, is_positive, rank_of
 from gms_fsm.systems.parts import COUNTS, LEAST_LOAD, LOAD, Body, Contact
 from gms_fsm.systems.reading.definitions import ContactEdge, Definition
-from gms_fsm.systems.reading.order import check_loops, in_order
+from gms_fsm.systems.reading.order import check_loops, in_order, read_by
 from gms_fsm.systems.reading.values import numbers_of, of
 from gms_fsm.systems.signals import REST, Formula
 from gms_fsm.systems.springs import added, spring_forces
@@ -198,6 +198,11 @@ class Assembly:
         given |= {f"{body.name} a" for body in self.system.bodies}
         shared = (each.name for each in self.definitions if each.bank is None)
         return frozenset(given) | {name for name in shared if self.closure([name]) & given}
+
+    @cached_property
+    def inputs(self) -> tuple[frozenset[str], ...]:
+        """By machine what its outputs are computed from, but for its own."""
+        return tuple(read_by(self, bank) for bank in self.banks)
 
     @cached_property
     def free(self) -> tuple[Body, ...]:

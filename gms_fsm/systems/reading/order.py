@@ -17,17 +17,18 @@ def order_of(read: Assembly) -> tuple[Bank, ...]:
     """Return the machines, each after those whose outputs its own outputs read."""
     found: list[Bank] = []
     waiting = [*read.banks]
+    given = {name for each in waiting for name in each.forces}
     while waiting:
-        given = {name for each in waiting for name in each.forces}
-        ready = [each for each in waiting if not read_by(read, each) & given]
-        if not ready:
+        ready = next((each for each in waiting if not read.inputs[each.index] & given), None)
+        if ready is None:
             names = ", ".join(each.name for each in waiting)
-            closing = " and ".join(sorted(read_by(read, waiting[0]) & given))
+            closing = " and ".join(sorted(read.inputs[waiting[0].index] & given))
             raise _loop(
                 read, f"the outputs of {names} follow from each other: {closing} closes the loop"
             )
-        found += ready[:1]
-        waiting.remove(ready[0])
+        found.append(ready)
+        waiting.remove(ready)
+        given.difference_update(ready.forces)
     return tuple(found)
 
 
@@ -74,7 +75,7 @@ def is_deferred(read: Assembly, bank: Bank) -> bool:
     if bank.periodic:
         return False
     names = read.closure(name for tree in bank.flows.values() for name in names_in(tree))
-    return bool(names & read.late - read_by(read, bank))
+    return bool(names & read.late - read.inputs[bank.index])
 
 
 def in_order(definitions: Iterable[Definition]) -> tuple[Definition, ...]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from integrators.machine_code.front_end.passing import passed_of
+from integrators.machine_code.front_end.passing import ANY_LENGTH, passed_of, without_lengths
 from integrators.machine_code.front_end.values import (
     ArrayValue,
     FixedValue,
@@ -205,6 +205,8 @@ def subscript(work: Work, node: ast.Subscript) -> Value:
         return ArrayValue(whole.kind, dims, whole.base, whole.offset, whole.index)
     place = integer(work, node.slice)
     if isinstance(place, Const) and place.value < 0:
+        if whole.dims[0] == ANY_LENGTH:
+            raise work.error("a place from the end is written with a minus")
         place = plus(whole.dims[0], place)
     # What is in the place of a row may change while the row is in use.
     if contains(place, Invoke) or (len(whole.dims) > 1 and contains(place, Load)):
@@ -425,6 +427,7 @@ def _record(work: Work, cls: Any, node: ast.Call) -> Value:
 
 def _own_call(work: Work, function: Callable[..., Any], arguments: list[Value]) -> Value | None:
     """Return a call of another function of the subset."""
+    arguments = without_lengths(work.translator.source(function), arguments)
     given_now, kinds = passed_of(arguments)
     done = work.translator.translated(function, arguments, kinds)
     name, result, slots = done.function.name, done.result, done.slots

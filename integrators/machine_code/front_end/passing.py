@@ -7,9 +7,11 @@ whose address follows from another's is not passed a second time.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from integrators.machine_code.front_end.bindings import bind
+from integrators.machine_code.front_end.sources import Source
 from integrators.machine_code.front_end.values import (
     ArrayValue,
     FixedValue,
@@ -20,6 +22,17 @@ from integrators.machine_code.front_end.values import (
 )
 from integrators.machine_code.front_end.work import Work
 from integrators.machine_code.tree import Const, Expr, Local
+
+ANY_LENGTH = Const("i", -1)  # of an array of which only entries are used
+
+
+def without_lengths(source: Source, arguments: Sequence[Value]) -> list[Value]:
+    """Return arguments without the lengths that do not matter: one translation serves them all."""
+    given, free = list(arguments), source.names.only_indexed
+    for k, (name, each) in enumerate(zip(source.parameters, arguments, strict=False)):
+        if name in free and isinstance(each, ArrayValue) and each.dims[0] != Const("i", 0):
+            given[k] = replace(each, dims=(ANY_LENGTH, *each.dims[1:]))
+    return given
 
 
 def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
@@ -63,7 +76,7 @@ def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
 
 def take(work: Work, arguments: Sequence[Value]) -> None:
     """Give a function its parameters, in the order in which `passed_of` passes them."""
-    names = [each.arg for each in work.source.definition.args.args]
+    names = work.source.parameters
     if len(names) != len(arguments):
         raise work.error(f"it takes {len(names)} arguments, not {len(arguments)}")
     known: dict[Local, Expr] = {}

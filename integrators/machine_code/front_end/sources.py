@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import functools
 import linecache
 import types
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -31,6 +33,64 @@ class TranslationError(Exception):
 
 
 @dataclass(frozen=True)
+class NamesUsed:
+    """What a text does with its names."""
+
+    assigned: Counter[str]  # how often
+    changed: set[str]  # variables of loops that are assigned inside them
+    read_after: set[str]  # read outside the loops over them
+    only_indexed: set[str]  # nothing but entries is used, none counted from the end
+
+
+def names_of(definition: ast.AST) -> NamesUsed:
+    """Return what a text does with its names.
+
+    Examples
+    --------
+    >>> names_of(ast.parse("for i in range(3): x[i] = len(y)")).only_indexed
+    {'x'}
+    """
+    used = NamesUsed(Counter(), set(), set(), set())
+    whole = set[str]()
+    nothing: frozenset[str] = frozenset()
+    waiting: list[tuple[Any, frozenset[str]]] = [(definition, nothing)]
+    while waiting:
+        node, loops = waiting.pop()
+        kind = type(node)
+        if kind is ast.Name:
+            whole.add(node.id)
+            if type(node.ctx) is ast.Store:
+                used.assigned[node.id] += 1
+                if node.id in loops:
+                    used.changed.add(node.id)
+            elif node.id not in loops:
+                used.read_after.add(node.id)
+        elif kind is ast.For:
+            inside = loops | {node.target.id} if type(node.target) is ast.Name else loops
+            waiting += [(node.iter, loops), (node.target, loops)]
+            waiting += [(each, inside) for each in node.body]
+        elif kind is ast.Subscript and type(node.value) is ast.Name and _is_place(node.slice):
+            used.only_indexed.add(node.value.id)
+            if node.value.id not in loops:
+                used.read_after.add(node.value.id)
+            waiting.append((node.slice, loops))
+        elif kind is not ast.Constant:
+            for name in node._fields:
+                part = getattr(node, name, None)
+                if type(part) is list:
+                    waiting += [(each, loops) for each in part]
+                elif isinstance(part, ast.stmt | ast.expr):
+                    waiting.append((part, loops))
+    used.only_indexed.difference_update(whole)
+    return used
+
+
+def _is_place(node: ast.expr) -> bool:
+    """Return whether an index is one place, which is not counted from the end."""
+    return not isinstance(node, ast.Slice | ast.UnaryOp)
+
+
+@dataclass(frozen=True)
 class Source:
     """The text of a function.
 
@@ -48,6 +108,16 @@ class Source:
     lines: list[str]
     definition: ast.FunctionDef
 
+    @functools.cached_property
+    def parameters(self) -> list[str]:
+        """The names of its parameters."""
+        return [each.arg for each in self.definition.args.args]
+
+    @functools.cached_property
+    def names(self) -> NamesUsed:
+        """What it does with its names."""
+        return names_of(self.definition)
+
     def error(self, reason: str, node: ast.AST) -> TranslationError:
         """Return an error at a node of the tree."""
         number = getattr(node, "lineno", self.definition.lineno)
@@ -59,7 +129,14 @@ class Source:
 class _File:
     lines: list[str]
     definitions: Mapping[tuple[str, int], ast.FunctionDef]
-    codes: Mapping[tuple[str, int], types.CodeType]
+    codes: Mapping[tuple[str, int], types.CodeType] | None  # None if it is in no file
+
+    def is_of(self, code: types.CodeType) -> bool:
+        """Return whether a function was made from this text, which a file may no longer have."""
+        if self.codes is None:
+            return True
+        own = self.codes.get((code.co_name, code.co_firstlineno))
+        return own is not None and _meaning(own) == _meaning(code)
 
 
 _files: dict[tuple[str, int], _File] = {}
@@ -77,8 +154,8 @@ def source_of(function: Callable[..., Any]) -> Source:
     code = function.__code__
     found = _file(code, function.__globals__)
     key = code.co_name, code.co_firstlineno
-    node, loaded = found.definitions.get(key), found.codes.get(key)
-    if node is None or loaded is None or _meaning(loaded) != _meaning(code):
+    node = found.definitions.get(key)
+    if node is None or not found.is_of(code):
         reason = "its text is not there, or has changed since it was loaded"
         raise TranslationError(reason, code.co_filename, code.co_name)
     return Source(function, found.lines, node)
@@ -96,10 +173,10 @@ def _meaning(code: types.CodeType) -> list[Any]:
 
 def _functions_in(tree: ast.AST) -> Iterator[ast.FunctionDef]:
     """Yield the functions of a text, those inside other statements too."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.FunctionDef):
-            yield node
-        if not isinstance(node, ast.expr):
+    for name in ("body", "orelse", "handlers", "finalbody", "cases"):
+        for node in getattr(tree, name, ()):
+            if isinstance(node, ast.FunctionDef):
+                yield node
             yield from _functions_in(node)
 
 
@@ -113,10 +190,17 @@ def _file(code: types.CodeType, names: dict[str, Any]) -> _File:
             (node.name, min([node.lineno, *(each.lineno for each in node.decorator_list)])): node
             for node in _functions_in(tree)
         }
-        codes, found = [compile(tree, code.co_filename, "exec", dont_inherit=True)], {}
-        while codes:
-            each = codes.pop()
-            found[each.co_name, each.co_firstlineno] = each
-            codes += [part for part in each.co_consts if isinstance(part, types.CodeType)]
-        _files[key] = _File(lines, definitions, found)
+        given = linecache.cache.get(code.co_filename)
+        in_file = given is None or len(given) == 1 or given[1] is not None
+        _files[key] = _File(lines, definitions, _codes(tree, code.co_filename) if in_file else None)
     return _files[key]
+
+
+def _codes(tree: ast.Module, filename: str) -> dict[tuple[str, int], types.CodeType]:
+    """Return what the functions of a text are compiled to, by name and first line."""
+    codes, found = [compile(tree, filename, "exec", dont_inherit=True)], {}
+    while codes:
+        each = codes.pop()
+        found[each.co_name, each.co_firstlineno] = each
+        codes += [part for part in each.co_consts if isinstance(part, types.CodeType)]
+    return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import functools
 from collections.abc import Sequence
 
 from integrators.machine_code.front_end.bindings import bind, give, own
@@ -20,6 +19,7 @@ from integrators.machine_code.front_end.expressions import (
     subscript,
     value,
 )
+from integrators.machine_code.front_end.sources import names_of
 from integrators.machine_code.front_end.values import (
     ArrayValue,
     FixedValue,
@@ -27,7 +27,7 @@ from integrators.machine_code.front_end.values import (
     RecordValue,
     Value,
 )
-from integrators.machine_code.front_end.work import Work, as_kind, assigned_in
+from integrators.machine_code.front_end.work import Work, as_kind
 from integrators.machine_code.tree import (
     Assign,
     Break,
@@ -143,7 +143,7 @@ def _while(work: Work, test: ast.expr, inside: Sequence[ast.stmt]) -> None:
 
 
 def _for(work: Work, name: str, over: ast.expr, inside: list[ast.stmt]) -> None:
-    if any(name in assigned_in(part) for part in inside):
+    if name in work.source.names.changed:
         raise work.error(f"the loop changes its own variable {name}")
     if isinstance(over, ast.Call) and value(work, over.func) == FixedValue(range):
         _over_range(work, name, over, inside)
@@ -169,32 +169,12 @@ def _over_range(work: Work, name: str, over: ast.Call, inside: Sequence[ast.stmt
     if work.scope[name] != bound or target.kind != "i":
         raise work.error(f"{name} would be of two kinds")
     stop = work.kept(stop)
-    if name in _read_after(
-        work.source.definition
-    ):  # then it is the last one that the body had, not the limit
+    if name in work.source.names.read_after:  # then it is what the body had last, not the limit
         place = work.new("i")
         made: tuple[Statement, ...] = (Assign(target, place), *_block(work, inside))
     else:
         place, made = target, _block(work, inside)
     work.out.append(For(place, start, stop, step.value, made))
-
-
-@functools.lru_cache(maxsize=1024)
-def _read_after(definition: ast.FunctionDef) -> frozenset[str]:
-    """Return the names that are read outside the loops over them."""
-    found = set[str]()
-    waiting: list[tuple[ast.AST, frozenset[str]]] = [(definition, frozenset())]
-    while waiting:
-        node, loops = waiting.pop()
-        match node:
-            case ast.Name(id=name, ctx=ast.Load()) if name not in loops:
-                found.add(name)
-            case ast.For(target=ast.Name(id=name), iter=over, body=inside):
-                waiting.append((over, loops))
-                waiting += [(each, loops | {name}) for each in inside]
-            case _:
-                waiting += [(each, loops) for each in ast.iter_child_nodes(node)]
-    return frozenset(found)
 
 
 def _over_array(work: Work, name: str, array: ArrayValue, inside: Sequence[ast.stmt]) -> None:
@@ -216,7 +196,8 @@ def _over_tuple(work: Work, name: str, whole: RecordValue, inside: Sequence[ast.
         raise work.error("a loop over a tuple cannot be left")
     parts = own(work, work.fresh(), whole)
     assert isinstance(parts, RecordValue)
-    work.count_assignments(*inside)  # each of them is translated several times
+    for each in inside:  # each of them is translated several times
+        work.assigned += names_of(each).assigned
     for part in parts.fields.values():
         work.scope[name] = part
         work.out += _block(work, inside)

@@ -19,7 +19,7 @@ from typing import Any
 
 from integrators.machine_code.front_end.expressions import FOREIGN, HostFunction
 from integrators.machine_code.front_end.passing import passed_of, take
-from integrators.machine_code.front_end.sources import TranslationError
+from integrators.machine_code.front_end.sources import Source, TranslationError, source_of
 from integrators.machine_code.front_end.statements import body
 from integrators.machine_code.front_end.values import ArrayValue, NumberValue, Value, leaves
 from integrators.machine_code.front_end.work import Again, Learnt, Specialised, Work
@@ -79,6 +79,7 @@ class Translator:
         self.module = Module()
         self.origins: dict[str, str] = {}  # by the name of a translation: the function's own
         self._done: dict[Any, Specialised] = {}
+        self._sources: dict[int, Source] = {}
         self._kept: list[Any] = []  # objects whose `id` is part of a key
         self._made: dict[Any, list[TypedFunction]] = {}
         self._names = {*FOREIGN.values(), "callbacks"}
@@ -179,6 +180,12 @@ class Translator:
             self._kept.append((function, arguments))
             self._done[key] = self._specialised(function, arguments)
         return self._done[key]
+
+    def source(self, function: Callable[..., Any]) -> Source:
+        """Return the text of a function, read once."""
+        if (found := self._sources.get(id(function))) is None:
+            self._sources[id(function)] = found = source_of(function)  # which keeps the function
+        return found
 
     def table(self, values: tuple[Any, ...]) -> ArrayValue:
         """Return constants as an array in memory; ragged rows are padded with zeros.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ast
-import functools
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from integrators.machine_code.front_end.sources import TranslationError, source_of
+from integrators.machine_code.front_end.sources import Source, TranslationError
 from integrators.machine_code.front_end.values import ArrayValue, Value
 from integrators.machine_code.tree import (
     Assign,
@@ -74,6 +74,9 @@ class Translating(Protocol):
 
     module: Module
 
+    def source(self, function: Callable[..., Any]) -> Source:
+        """Return the text of a function."""
+
     def translated(
         self, function: Callable[..., Any], arguments: Sequence[Value], types: tuple[Any, ...]
     ) -> Specialised:
@@ -100,7 +103,7 @@ class Work:
         self, translator: Translating, function: Callable[..., Any], learnt: Learnt
     ) -> None:
         self.translator, self.learnt = translator, learnt
-        self.source = source_of(function)
+        self.source = translator.source(function)
         self.names: dict[str, Any] = function.__globals__
         self.node: ast.AST = self.source.definition  # being translated
         self.out: list[Statement] = []
@@ -108,17 +111,10 @@ class Work:
         self.variables: dict[str, Local] = {}
         self.scope: dict[str, Value] = {}
         self.first: dict[str, Value] = {}  # what was assigned first
-        self.assigned: dict[str, int] = {}  # how often the text assigns each name
+        self.assigned = Counter(self.source.names.assigned)  # how often the text assigns each name
         self.slots: dict[str, Local] = {}  # of what is returned
         self.gives: bool | None = None  # whether it returns a value
         self.temporary = 0
-        self.count_assignments(self.source.definition)
-
-    def count_assignments(self, *nodes: ast.AST) -> None:
-        """Count assignments to names."""
-        for node in nodes:
-            for name in assigned_in(node):
-                self.assigned[name] = self.assigned.get(name, 0) + 1
 
     def error(self, reason: str) -> TranslationError:
         """Return an error at the present line."""
@@ -166,13 +162,6 @@ class Work:
     def constant(self, expr: Expr) -> bool:
         """Return whether an expression reads nothing but parameters."""
         return all(each in self.parameters for each in locals_in(expr))
-
-
-@functools.lru_cache(maxsize=1024)
-def assigned_in(node: ast.AST) -> tuple[str, ...]:
-    """Return the names that a part of a text assigns, as often as it does."""
-    names = (each for each in ast.walk(node) if isinstance(each, ast.Name))
-    return tuple(each.id for each in names if isinstance(each.ctx, ast.Store))
 
 
 def as_kind(work: Work, expr: Expr, kind: str) -> Expr:
