@@ -194,7 +194,7 @@ class CNames:
     def __call__(self, name: str) -> str:
         """Return the name of a variable or a function."""
         if name not in self._found:
-            words = re.sub(r"\W+", "_", re.sub(r"\.\d+\.$", "", name)).strip("_")
+            words = re.sub(r"\W+", "_", re.sub(r"^\.\d+\.|\.\d+\.$", "", name)).strip("_")
             free = words = f"u{words}" if words[:1].isdigit() else words
             number = 1
             while free in self._taken:

@@ -31,7 +31,7 @@ from gms_fsm.lowering.places import Places, total
 from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import Computed, ProgramPlan, RoughCall
 from gms_fsm.systems.reading.assembly import of
-from integrators import FOR_A_SIGN, LIVE, WAITING
+from integrators import LIVE
 
 # Where a rough call takes its sign from: held ones, those seen now, or given ones, some of which
 # may be marked as live.
@@ -181,9 +181,9 @@ class ProgramWriter(ABC):
             return CodeLine(f"{rough.name} = {value}", sizes)
         return CodeLine(f"{rough.name} = {value}", sizes | computed_names(call))
 
-    def why(self, u: Value) -> int:
+    def why(self, u: Value) -> str:
         """Say why a sign is watched; one that follows time changes while nothing moves."""
-        return FOR_A_SIGN | (WAITING if self.follows_time(u) else 0)
+        return "FOR_A_SIGN | WAITING" if self.follows_time(u) else "FOR_A_SIGN"
 
     def follows_time(self, tree: Node) -> bool:
         """Return whether a tree depends on time though nothing moves.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from gms_fsm.lowering.printing.forces import ForceWriter
 from gms_fsm.lowering.printing.lines import CodeLine
 from gms_fsm.lowering.printing.locks import ENDLESS
-from integrators import LET_GO
 
 
 class LockFunctions(ForceWriter):
@@ -16,7 +15,7 @@ class LockFunctions(ForceWriter):
         lines: list[CodeLine] = []
         for bank in self.read.banks if self.locking else ():
             if bank.locked:
-                lines.append(CodeLine(f"if jolt[{self.machine(bank.index, '0')}] == {LET_GO}:"))
+                lines.append(CodeLine(f"if jolt[{self.machine(bank.index, '0')}] == LET_GO:"))
                 for force, v in zip(bank.forces, bank.velocities, strict=True):
                     text = f"    {self.local(force)} = {self.local(v)} * {ENDLESS}"
                     lines.append(CodeLine(text, frozenset({v})))
@@ -42,6 +41,6 @@ class LockFunctions(ForceWriter):
         return self.function(
             "jolts(t, y, mode, p, least, mark, was, jolt)",
             "was = velocities of contacts that lock; mark the ones that differ from it.",
-            self.locks.jolts() if self.locking else [],
+            [*self.driven_accelerations(), *self.locks.jolts()] if self.locking else [],
             "live",
         )

@@ -29,7 +29,6 @@ from gms_fsm.lowering.printing.lines import CodeLine, ProgramWriter, indented, r
 from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import times
 from gms_fsm.systems.system import Body
-from integrators import JUMPED, LET_GO
 
 # A pivot under this part of the diagonal is one that rounding has left of zero.
 DEPENDENT = 1e-9
@@ -497,7 +496,7 @@ class Locks:
 
     def jolts(self) -> list[CodeLine]:
         """Write which contacts have been moved by more than the motion itself moves them."""
-        lines = self.writer.driven_accelerations()
+        lines: list[CodeLine] = []
         for bank in self.read.banks:
             first = [r for r, each in enumerate(self.rows) if each.bank == bank.index]
             if not bank.locked:
@@ -532,9 +531,9 @@ class Locks:
             lines += [
                 CodeLine("if mark > 0:"),
                 CodeLine(f"    if {self.locking(first[0])}:"),
-                CodeLine(f"        {jolt} = {LET_GO} * moves"),
+                CodeLine(f"        {jolt} = LET_GO * moves"),
                 CodeLine("    elif moved + moves == 2:"),
-                CodeLine(f"        {jolt} = {JUMPED}"),
+                CodeLine(f"        {jolt} = JUMPED"),
             ]
         return lines
 

@@ -11,27 +11,18 @@ from gms_fsm.charts.nesting import spelled
 from gms_fsm.language import Binary, Name, Node, product_power
 from gms_fsm.lowering.layout import sizes_of
 from gms_fsm.systems.reading.assembly import Assembly, Bank
+from integrators import FOR_A_GUARD, FOR_A_SIGN, JUMPED, LET_GO, WAITING
 
+# The loop's numbers: whose velocity has jumped, and why a comparison is watched.
+MARKS = {"JUMPED": JUMPED, "LET_GO": LET_GO}
+REASONS = {"FOR_A_SIGN": FOR_A_SIGN, "FOR_A_GUARD": FOR_A_GUARD, "WAITING": WAITING}
 # Names that the text uses itself. What a user calls like one of them is called otherwise there.
 TEXT = frozenset(
     {"dS", "dy", "edge", "held", "i", "j", "len", "machine", "mode", "n", "nan", "out", "own", "p"}
     | {"piecewise_linear", "piecewise_slope", "range", "shared", "surface", "tables", "watch", "y"}
     | {"abs", "exp", "log", "sqrt", "sgn", "min", "max", "sin", "cos", "tanh", "atan", "asinh"}
-    | {
-        "floor",
-        "round",
-        "tooth",
-        "noise",
-        "pow",
-        "pi",
-        "F_i",
-        "t",
-        "jolt",
-        "least",
-        "mark",
-        "skip",
-        "was",
-    }
+    | {"floor", "round", "tooth", "noise", "pow", "pi", "F_i", "t", "jolt", "least", "mark", "skip"}
+    | {"was", *MARKS, *REASONS}
 )
 
 

@@ -32,10 +32,10 @@ from gms_fsm.lowering.printing.lines import (
     reads_of,
 )
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
-from gms_fsm.lowering.printing.names import computed_names
+from gms_fsm.lowering.printing.names import MARKS, REASONS, computed_names
 from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sides
 from gms_fsm.systems.reading.assembly import Bank, ContactEdge, of
-from integrators import FOR_A_GUARD, FOR_A_SIGN, JUMPED, LIVE, WAITING
+from integrators import LIVE
 
 FUNCTIONS = (
     "flow",
@@ -78,6 +78,8 @@ def python(plan: ProgramPlan) -> str:
         lines.append(f"{numbered(states.values())}  # states{whose}")
     if any(plan.names.edges):
         lines.append(f"{numbered(edge for each in plan.names.edges for edge in each)}  # edges")
+    marks = {**REASONS, **(MARKS if printer.locking else {})}
+    lines.append(f"{', '.join(marks)} = {', '.join(map(str, marks.values()))}  # marks of the loop")
     for function in (
         printer.switch(),
         printer.act(),
@@ -120,7 +122,7 @@ class _PythonPrinter(LockFunctions):
                 for k, (edge, constant) in enumerate((*leaving, *refused)):
                     word, guard = "elif" if k % MOST_BRANCHES else "if", self.spell(edge.guard)
                     if edge.arrests and not constant.startswith("-"):
-                        guard = f"{jolt} != {JUMPED} and ({guard})"
+                        guard = f"{jolt} != JUMPED and ({guard})"
                     if edge.name in skipped:
                         guard = f"skip != {constant} and {guard}"
                     pair = [
@@ -425,7 +427,7 @@ class _PythonPrinter(LockFunctions):
         text = f"held[{held.text(u)}] = sgn({self.spell(u)})"
         return CodeLine(text, sizes | computed_names(u))
 
-    def watch(self, relation: Comparison, why: int = FOR_A_SIGN) -> CodeLine:
+    def watch(self, relation: Comparison, why: str = "FOR_A_SIGN") -> CodeLine:
         relations = self.plan.relations
         sizes = frozenset(f"#{size}" for size in relations.sizes(relation))
         return CodeLine(f"watch[{relations.text(relation)}] |= {why}", sizes)
@@ -453,7 +455,7 @@ class _PythonPrinter(LockFunctions):
             waits = waits or self.follows_time(part.relation)
             return [
                 CodeLine(f"if not {self.spell(part.relation)}:", reads),
-                *indented([self.watch(part.comparison, FOR_A_GUARD | (WAITING if waits else 0))]),
+                *indented([self.watch(part.comparison, "FOR_A_GUARD" + " | WAITING" * waits)]),
             ]
         word, parts = part
         if word == "either":

@@ -231,8 +231,10 @@ def operation(work: Work, op: ast.operator, a: Expr, b: Expr) -> Expr:
         raise work.error(f"{sign} is for integers only")
     if isinstance(b, Const) and b.value == 0 and sign in ("//", "%"):
         raise work.error("division by zero")
-    if isinstance(a, Const) and isinstance(b, Const) and not (sign == "/" and b.value == 0.0):
-        return _constant(compute(a.value, b.value))
+    if isinstance(a, Const) and isinstance(b, Const):
+        named = sign == "|" and a.name and b.name  # names of bits say more than their sum
+        if not (named or (sign == "/" and b.value == 0.0)):
+            return _constant(compute(a.value, b.value))
     return Op(a.kind, sign, (a, b))
 
 

@@ -168,9 +168,9 @@ def _over_range(work: Work, name: str, over: ast.Call, inside: Sequence[ast.stmt
     work.scope[name] = work.first.setdefault(name, bound)
     if work.scope[name] != bound or target.kind != "i":
         raise work.error(f"{name} would be of two kinds")
-    stop = work.kept(stop)
+    stop = work.kept(stop, f"{name}_end")
     if name in work.source.names.read_after:  # then it is what the body had last, not the limit
-        place = work.new("i")
+        place = work.new("i", word=f"{name}_next")
         made: tuple[Statement, ...] = (Assign(target, place), *_block(work, inside))
     else:
         place, made = target, _block(work, inside)
@@ -180,10 +180,10 @@ def _over_range(work: Work, name: str, over: ast.Call, inside: Sequence[ast.stmt
 def _over_array(work: Work, name: str, array: ArrayValue, inside: Sequence[ast.stmt]) -> None:
     work_array = own(work, work.fresh(), array)
     assert isinstance(work_array, ArrayValue)
-    place = work.new("i")
+    place = work.new("i", word=f"{name}_at")
     entry = work_array.at(place)
     assert isinstance(entry, NumberValue)
-    stop = work.kept(work_array.dims[0])
+    stop = work.kept(work_array.dims[0], f"{name}_end")
     before, work.out = work.out, []
     bind(work, name, entry)
     first, work.out = work.out, before
@@ -217,10 +217,10 @@ def _assign(work: Work, target: ast.expr, given: ast.expr) -> None:
         read = {each.id for each in ast.walk(given) if isinstance(each, ast.Name)}
         if names & read or any(not isinstance(each, ast.Name) for each in target.elts):
             parts = [
-                steady(work, each)
+                NumberValue(work.kept(each.expr, f"new_{getattr(to, 'id', 'value')}"))
                 if isinstance(each, NumberValue)
                 else own(work, work.fresh(), each)
-                for each in parts
+                for each, to in zip(parts, target.elts, strict=False)
             ]
     else:
         whole = value(work, given)

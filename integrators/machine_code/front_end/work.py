@@ -142,20 +142,20 @@ class Work:
         self.out.append(Assign(local, as_kind(self, expr, local.kind)))
         return local
 
-    def fresh(self) -> str:
-        """Return a name that no variable has."""
+    def fresh(self, word: str = "kept") -> str:
+        """Return a name that no variable has; a word for readers ends it."""
         self.temporary += 1
-        return f".{self.temporary}"
+        return f".{self.temporary}.{word}"
 
-    def new(self, kind: str, to: str = "") -> Local:
+    def new(self, kind: str, to: str = "", word: str = "kept") -> Local:
         """Return a new local variable."""
-        return self.variable(self.fresh(), kind, to)
+        return self.variable(self.fresh(word), kind, to)
 
-    def kept(self, expr: Expr) -> Expr:
+    def kept(self, expr: Expr, word: str = "kept") -> Expr:
         """Return an expression that keeps its present value."""
         if isinstance(expr, Const | Global) or expr in self.parameters:
             return expr
-        local = self.new(expr.kind, leads_to(expr))
+        local = self.new(expr.kind, leads_to(expr), word)
         self.out.append(Assign(local, expr))
         return local
 

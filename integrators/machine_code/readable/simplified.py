@@ -200,6 +200,8 @@ class _Certain:
                 first = of(name, left)
                 if holds(first) or fails(first):
                     return right if holds(first) == (op == "and") else Const("b", op == "or")
+            case Op(op="|", operands=(Const(name=one), Const(name=other))) if one and other:
+                return expr
         if isinstance(expr, Const | Global | AddressOf) or not _pure(expr):
             return expr
         values = of(name, expr)
