@@ -36,36 +36,23 @@ from integrators.sliding import (
     sliding_scratch,
     slope_on,
 )
-from integrators.switching.jolts import (
-    CHANGES_FORCES,
-    EVENT,
-    IMPULSE,
-    JUMPED,
-    LET_GO,
-    MOST_EVENTS,
-    TICK,
-)
+from integrators.switching.jolts import JUMPED, LET_GO
 from integrators.tableaux import BS23, DP45, EULER, HEUN, METHODS, RK4, Tableau
 
 __all__ = [
     "BS23",
-    "CHANGES_FORCES",
     "DP45",
     "EULER",
-    "EVENT",
     "FOR_A_GUARD",
     "FOR_A_SIGN",
     "HEUN",
-    "IMPULSE",
     "JUMPED",
     "LET_GO",
     "LIVE",
     "METHODS",
-    "MOST_EVENTS",
     "MOST_SWITCHES",
     "RK4",
     "ROWS_AT_ONCE",
-    "TICK",
     "WAITING",
     "Arc",
     "Entangled",

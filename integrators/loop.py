@@ -36,7 +36,6 @@ from integrators.switching.jolts import (
     LET_GO,
     arrived,
     cut,
-    hear,
     jolted,
     marked,
     only_let_go,
@@ -103,7 +102,7 @@ class Memory:
     switches: list[int]  # firings of each machine since the time `Now.anchor`
     changes: list[int]  # changes of each relation since that time
     anchor: Vector  # the state at that time
-    heard: list[int]  # the tick and the events that each machine has answered, as bits
+    heard: list[int]  # what each machine has answered, as bits (see `cut`)
     was: Vector  # velocities before this instant, where locks make them matter; else empty
     jolt: list[int]  # JUMPED or LET_GO for each machine whose velocity has changed at once
 
@@ -144,14 +143,15 @@ def run_to_event(
             memory.machine = -1
             memory.fired_one = False
             memory.phase = PICK
-            whole = not marked(memory.jolt, LET_GO)
-            only_new(plan.kinds, memory.edges, memory.heard)
+            moved, whole = marked(memory.jolt, LET_GO), True
+            if len(plan.kinds) > 0:
+                only_new(plan.kinds, memory.edges, memory.heard)
             if len(memory.was) > 0:
                 refused = only_let_go(plan.located, memory.edges, memory.jolt)
                 if refused >= 0:
                     _refuse(memory, refused, -2 - memory.edges[refused])
-            whole = cut(plan.located, plan.kinds, memory.edges) and whole
-            hear(whole, plan.kinds, memory.edges, memory.heard)
+            if len(plan.kinds) > 0:
+                whole = cut(plan.located, plan.kinds, memory.edges, memory.heard, moved)
             if plan.events > 0 and whole:
                 switch.tick(plan.events, now.t, now.y, now.mode, p)
         elif phase == PICK:
@@ -166,7 +166,9 @@ def run_to_event(
                 memory.phase = JUMPING
             elif memory.hold > 0:  # discrete machines have fired: what they give out is held now
                 switch.tick(memory.hold, now.t, now.y, now.mode, p)
-                event = _held(now, memory, out)
+                memory.hold = 0
+                memory.fresh = True
+                event = _jump(now, memory, out)
             else:
                 if plan.located:
                     for i in range(len(memory.jolt)):
@@ -475,18 +477,8 @@ def _make_due(plan: RunPlan, memory: Memory) -> None:
             memory.hold |= plan.discrete[i]
 
 
-def _held(now: Now, memory: Memory, out: Output) -> int:
-    """Go on with what discrete machines give out from now on."""
-    memory.hold = 0
-    memory.fresh = True
-    memory.phase = ASK
-    if out.every_step:
-        put_row(out, now.t, now.y)
-    return STOPPED
-
-
 def _jump(now: Now, memory: Memory, out: Output) -> int:
-    """Pass a jump of the flow."""
+    """Pass a jump of the flow, or of what discrete machines give out."""
     memory.phase = ASK
     if out.every_step:
         put_row(out, now.t, now.y)

@@ -165,31 +165,14 @@ class Joints:
         if not self.alone.acquire(False):  # as `with self.alone`, in a third of the time
             raise in_use()
         try:
-            now = self.t
-            end = now + dt
-            if end == now and dt > 0.0:
-                raise ParameterError(
-                    f"it is below the resolution of the clock at t = {end!r} s",
-                    place="dt",
-                    value=dt,
-                    advice="start at a smaller t=...",
-                )
-            return self._commit(v0, v1, end, inputs)
+            return self._commit(v0, v1, end_of(self.t, dt), inputs)
         finally:
             self.alone.leave()
 
     def advance_to(self, v0: Any, v1: Any, t: Any, inputs: Mapping[str, Any]) -> Any:
         """Advance to a time that is not before the present one."""
         with self.alone:
-            end = checked_scalar("t", t, "finite")
-            if end < self.t:
-                raise ParameterError(
-                    f"it is before the present time {self.t!r} s",
-                    place="t",
-                    value=end,
-                    advice="restore a snapshot to go back",
-                )
-            return self._commit(v0, v1, end, inputs)
+            return self._commit(v0, v1, end_at(self.t, t), inputs)
 
     def peek(self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Any]) -> Any:
         """Return the forces at the end of a sample, and stay."""
@@ -199,7 +182,7 @@ class Joints:
             now = self.t
             end = now + dt
             if end > LATEST:
-                raise too_late(end)
+                raise _too_late(end)
             before = self._copy()
             try:
                 return self._step(v0, v1, end, inputs, {}, now)
@@ -209,8 +192,6 @@ class Joints:
             self.alone.leave()
 
     def _commit(self, v0: Any, v1: Any, end: float, inputs: Mapping[str, Line]) -> Any:
-        if end > LATEST:
-            raise too_late(end)
         t, last, spare = self.t, self._last, self._spare
         before = self._copy(spare)
         lost: Lost = {}
@@ -345,7 +326,37 @@ def checked_engine(engine: object) -> str:
     return engine
 
 
-def too_late(t: float) -> ParameterError:
+def end_of(now: float, dt: float) -> float:
+    """Return the end of a sample; the clock must resolve it."""
+    end = now + dt
+    if end == now and dt > 0.0:
+        raise ParameterError(
+            f"it is below the resolution of the clock at t = {now!r} s",
+            place="dt",
+            value=dt,
+            advice="start at a smaller t=...",
+        )
+    if end > LATEST:
+        raise _too_late(end)
+    return end
+
+
+def end_at(now: float, t: Any) -> float:
+    """Return the end of a sample that is given as a time."""
+    end = checked_scalar("t", t, "finite")
+    if end < now:
+        raise ParameterError(
+            f"it is before the present time {now!r} s",
+            place="t",
+            value=end,
+            advice="restore a snapshot to go back",
+        )
+    if end > LATEST:
+        raise _too_late(end)
+    return end
+
+
+def _too_late(t: float) -> ParameterError:
     """Return the error for the end of a sample that the clock cannot resolve."""
     return ParameterError("it is too large", place="t", value=t, advice=f"at most {LATEST:g} s")
 

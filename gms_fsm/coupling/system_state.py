@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Unpack
 
 from gms_fsm.charts.parameters import checked_scalar
-from gms_fsm.coupling.joints import checked_engine, too_late
+from gms_fsm.coupling.joints import checked_engine, end_at, end_of
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.run.problem import LATEST
@@ -147,17 +147,7 @@ class SystemState:
         """
         plant = self._plant
         with plant.alone:
-            end = checked_scalar("t", t, "finite")
-            if end < plant.t:
-                raise ParameterError(
-                    f"it is before the present time {plant.t!r} s",
-                    place="t",
-                    value=end,
-                    advice="restore a snapshot to go back",
-                )
-            if end > LATEST:
-                raise too_late(end)
-            plant.commit(end, *self._lines(inputs))
+            plant.commit(end_at(plant.t, t), *self._lines(inputs))
 
     def peek(self, dt: float, *names: str, **inputs: Any) -> tuple[float, ...]:
         """Return values that there would be after a sample, and stay.
@@ -205,18 +195,7 @@ class SystemState:
         """Return the end of a sample."""
         if type(dt) is not float or not 0.0 <= dt < LATEST:
             dt = checked_scalar("dt", dt, ">= 0")
-        now = self._plant.t
-        end: float = now + dt
-        if end == now and dt > 0.0:
-            raise ParameterError(
-                f"it is below the resolution of the clock at t = {now!r} s",
-                place="dt",
-                value=dt,
-                advice="start at a smaller t=...",
-            )
-        if end > LATEST:
-            raise too_late(end)
-        return end
+        return end_of(self._plant.t, dt)
 
     def _lines(self, inputs: Mapping[str, Any]) -> tuple[list[float], list[float]]:
         """Return the inputs at the start and at the end of a sample, or refuse them."""

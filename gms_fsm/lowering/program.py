@@ -63,7 +63,8 @@ from gms_fsm.systems.signals import (
     Signal,
 )
 from gms_fsm.systems.system import System
-from integrators import CHANGES_FORCES, EVENT, IMPULSE, LIVE, MOST_EVENTS, TICK
+from integrators import LIVE
+from integrators.switching.jolts import CHANGES_FORCES, EVENT, IMPULSE, MOST_EVENTS, TICK
 
 Arguments = tuple[list[float], list[list[float]], list[list[float]]]
 

@@ -9,17 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.run.problem import Problem
-from integrators import (
-    EVENT,
-    FOR_A_GUARD,
-    FOR_A_SIGN,
-    LET_GO,
-    MOST_EVENTS,
-    WAITING,
-    hybrid,
-    loop,
-)
+from integrators import FOR_A_GUARD, FOR_A_SIGN, LET_GO, WAITING, hybrid, loop
 from integrators.runners import states
+from integrators.switching.jolts import EVENT, MOST_EVENTS
 
 
 def last_states(start: Problem) -> NDArray[np.int64]:

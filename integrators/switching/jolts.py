@@ -49,30 +49,29 @@ def only_new(kinds: list[int], edges: list[int], heard: list[int]) -> None:
     """Drop edges that wait for a tick, or an event, which their machine has answered."""
     for i in range(len(edges)):
         edge = max(edges[i], -2 - edges[i])  # one that is refused, too
-        if len(kinds) > 0 and edge >= 0 and kinds[edge] & heard[i] > 0:
+        if edge >= 0 and kinds[edge] & heard[i] > 0:
             edges[i] = -1
 
 
-def cut(located: bool, kinds: list[int], edges: list[int]) -> bool:
-    """Drop the edges behind one after which all are asked again; return whether none waited."""
-    alone, whole = False, True
+def cut(located: bool, kinds: list[int], edges: list[int], heard: list[int], moved: bool) -> bool:
+    """Drop the edges behind one after which all are asked again; return whether all had their turn.
+
+    Whoever had none, as others go first, hears events and its tick once more.
+    """
+    alone, whole = False, not moved
     for i in range(len(edges)):
-        if len(kinds) > 0 and edges[i] >= 0:
+        if edges[i] >= 0:
             kind = kinds[edges[i]]
             if alone:
                 whole = whole and kind < TICK
                 edges[i] = -1
             alone = alone or (located and kind & ALONE > 0)
-    return whole
-
-
-def hear(whole: bool, kinds: list[int], edges: list[int], heard: list[int]) -> None:
-    """Store who has answered: whoever had no turn, as others go first, hears it once more."""
     for i in range(len(edges)):
         if whole:
             heard[i] = TICK
-        elif edges[i] >= 0 and len(kinds) > 0:
+        elif edges[i] >= 0:
             heard[i] |= kinds[edges[i]]
+    return whole
 
 
 def jolted(switch: Any, now: Now, was: Vector, jolt: list[int], p: Any) -> None:

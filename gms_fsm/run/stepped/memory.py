@@ -179,8 +179,8 @@ class BlockMemory:
         from integrators.machine_code.layout import MemoryBlock
 
         code, count = machine_code(starts[0], waits=waits), len(starts)
-        self._words = np.zeros(count * code.layout.words, dtype=np.int64)
-        self._view: Any = memoryview(self._words)  # copied in half the time
+        zeros: Any = np.zeros(count * code.layout.words, dtype=np.int64)
+        self._words, self._view = zeros, memoryview(zeros)  # which copies in half the time
         each = []
         for start, words in zip(starts, self._words.reshape(count, -1), strict=True):
             block = MemoryBlock(code.layout, arguments_of(start, waits=waits), words=words)
