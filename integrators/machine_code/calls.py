@@ -66,7 +66,7 @@ class CompiledFunction:
             self._load(at_once=False)
             library: Library = self._kept[-1][0]
             if self.more is not None:
-                library.add(self.more())
+                library.add(self.more(), ["entry"])
             return library
 
     def _load(self, *, at_once: bool) -> None:

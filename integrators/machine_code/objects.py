@@ -123,23 +123,31 @@ class Library:
     """
 
     def __init__(self, content: bytes) -> None:
-        llvm = _binding()
-        with _lock:
-            self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        self._engines: list[Any] = []
         self.add(content)
 
-    def add(self, content: bytes) -> None:
-        """Load a further object, which may call the entries of those before."""
+    def add(self, content: bytes, known: Collection[str] = ()) -> None:
+        """Load a further object, which may call these entries of those before.
+
+        It has an engine of its own: in one, LLVM takes the table of offsets of the first object for
+        that of the second, and calls between functions of this one go astray.
+        """
+        llvm = _binding()
         with _lock:
-            self._engine.add_object_file(_binding().ObjectFileRef.from_data(content))
-            self._engine.finalize_object()
+            module = llvm.parse_assembly("".join(f"declare void @{name}()\n" for name in known))
+            engine = llvm.create_mcjit_compiler(module, _machine())
+            for name in known:
+                engine.add_global_mapping(module.get_function(name), self.address(name))
+            engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+            engine.finalize_object()
+            self._engines.append(engine)
 
     def address(self, name: str) -> int:
         """Return the address of an entry."""
-        found: int = self._engine.get_function_address(name)
-        return found
+        found = (each.get_function_address(name) for each in self._engines)
+        return next(filter(None, found), 0)
 
     def variable(self, name: str) -> int:
         """Return the address of a global variable."""
-        found: int = self._engine.get_global_value_address(name)
+        found: int = self._engines[0].get_global_value_address(name)
         return found

@@ -12,15 +12,18 @@ import pytest
 
 from gms_fsm import (
     GMS,
+    ChartModel,
     GMSParameters,
     ParameterError,
     Prepared,
+    Prescribed,
     PulledSlider,
     Trace,
     prepare,
     simulate,
 )
 from gms_fsm.errors import GMSError
+from gms_fsm.identification.play_bank import SPRING_WITH_PLAY
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in, value_in, varied
 from tests.corpus import CORPUS, FAILING, FEW, QUICK, each, run
@@ -119,6 +122,17 @@ def test_an_exponent_of_two_is_another_program_from_either_side() -> None:
     what = varied(mounted(*PULLED), {"delta": 1.5})
     ready = prepare(what.model, what.rig, 20.0, engine=FASTEST)
     assert other_parts(ready(delta=2.0), simulate(*PULLED, 20.0, engine=FASTEST)) == []
+
+
+def test_calls_between_further_functions_arrive() -> None:
+    """Both objects of this one have a table of offsets; LLVM would mix the two up."""
+    z_c = 0.1 * np.arange(1, 8)
+    terms = dict.fromkeys(("k_f", "k_b", "d_f", "d_b"), 1.0)
+    model = ChartModel(SPRING_WITH_PLAY, {**terms, "g": 0.05, "z_c": z_c, "v_s": 1.0}, n=7)
+    times = np.linspace(0.0, 4.0, 41)
+    here = model, Prescribed((times, np.cos(3.0 * times)))
+    theirs = simulate(*here, 4.0, engine=FASTEST)
+    assert other_parts(prepare(*here, 4.0, engine=FASTEST)(), theirs) == []
 
 
 @pytest.mark.parametrize("mass", [10**400, np.array([]), np.array([1.0, 2.0])], ids=str)
