@@ -23,6 +23,7 @@ from gms_fsm import (
 )
 from gms_fsm.charts.registry import registered
 from gms_fsm.identification.candidates import BEHIND_BACKLASH, STIFFER_ONE_WAY
+from gms_fsm.identification.play_bank import SPRING_WITH_PLAY
 from gms_fsm.identification.problem.linear import linear_names
 from gms_fsm.systems.models import demonstration, with_values
 from gms_fsm.systems.mounted import mounted_alone
@@ -68,6 +69,9 @@ def test_what_the_elements_feel_is_searched() -> None:
     backlash = {"k": 3.0, "b": 1.0, "g": 0.2, "r": 0.3, "ratio": 1.5, "rho": 0.0, "v_s": 1.0}
     models |= {"behind": ChartModel(BEHIND_BACKLASH, backlash)}
     models |= {"stiffer": ChartModel(STIFFER_ONE_WAY, {"k": 3.0, "b": -1.0, "z_c": 0.4})}
+    play = {"k_f": 1.0, "k_b": 1.0, "d_f": 1.0, "d_b": 1.0, "g": 0.1, "z_c": 0.4, "v_s": 1.0}
+    models |= {"play": ChartModel(SPRING_WITH_PLAY, play)}
+    expected |= {"play": {"k_f", "k_b", "d_f", "d_b"}}
     for name, model in models.items():
         linear = {*linear_names(mounted_alone(model))} - {"sigma_2"}
         assert linear == expected.get(name, {"k", "b"}), name

@@ -56,6 +56,8 @@ def _linear_in(chart: Chart) -> tuple[str, ...]:
         found = [name for name in found if not any(name in names_in(tree) for tree in totals)]
     if not all(_is_affine(tree, chart.force_names) for tree in totals):
         return ()
+    # What is not linear even alone keeps no other from being linear beside it.
+    found = [name for name in found if all(_is_affine(tree, [name]) for tree in forces)]
     changed = True
     while changed:  # a parameter in a product with another is left out, then asked again
         changed = False
