@@ -30,21 +30,11 @@ EXAMPLE = 'free = ["k"] and further keys of gms_fsm.fit'
 
 @dataclass(frozen=True, eq=False)
 class LoadedFit:
-    """A fit that a file describes, with its record read.
+    """A fit that a file describes, with its record read."""
 
-    Parameters
-    ----------
-    path : Path
-        The scenario file.
-    task : Task
-        Model, record and options, checked; for `gms_fsm.identification.fit.fitted`.
-    notes : tuple of str
-        What in the file has no effect on a fit.
-    """
-
-    path: Path
-    task: Task
-    notes: tuple[str, ...] = ()
+    path: Path  # the scenario file
+    task: Task  # model, record and options, checked; for `gms_fsm.identification.fit.fitted`
+    notes: tuple[str, ...] = ()  # what in the file has no effect on a fit
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -54,28 +44,7 @@ class LoadedFit:
 
 
 def load_fit(path: str | Path, overrides: Sequence[str] = ()) -> LoadedFit:
-    """Read a scenario file with a table [fit], and its record.
-
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file: [model], [rig] of kind "record", [record] and [fit]; or a system file with
-        [record] and [fit].
-    overrides : sequence of str
-        As in `gms_fsm.app.scenario.load_scenario`.
-
-    Returns
-    -------
-    LoadedFit
-        Ready to be searched.
-
-    Raises
-    ------
-    ScenarioError
-        If the file is invalid, has no record or no table [fit], or these do not suit the model.
-    RecordError
-        If the record is invalid, or nothing can be found from it.
-    """
+    """Read a scenario file with a table [fit], and its record."""
     path = scenario_file(path)
     scenario: Scenario | SystemScenario
     model: Model | System

@@ -22,70 +22,36 @@ from gms_fsm.phenomena.measure import Progress
 
 @dataclass(frozen=True)
 class Row:
-    """One model on one data set.
+    """One model on one data set."""
 
-    Parameters
-    ----------
-    model : str
-        Name.
-    free : int or None
-        Number of unknowns; None where it is not known.
-    train_rmse, rmse, r2 : float or None
-        On training rows and on what was held out, N.
-    seconds : float or None
-        Time for all splits.
-    by_record : dict of str to float
-        RMSE of each held-out record, N.
-    note : str
-        What to know, or why it failed.
-    """
-
-    model: str
-    free: int | None = None
-    train_rmse: float | None = None
-    rmse: float | None = None
-    r2: float | None = None
-    seconds: float | None = None
-    by_record: dict[str, float] = field(default_factory=dict)
-    note: str = ""
+    model: str  # name
+    free: int | None = None  # number of unknowns; None where it is not known
+    train_rmse: float | None = None  # on training rows, N
+    rmse: float | None = None  # on what was held out, N
+    r2: float | None = None  # the same
+    seconds: float | None = None  # time for all splits
+    by_record: dict[str, float] = field(default_factory=dict)  # RMSE of each held-out record, N
+    note: str = ""  # what to know, or why it failed
 
 
 @dataclass(frozen=True)
 class Section:
-    """All models on one data set.
+    """All models on one data set."""
 
-    Parameters
-    ----------
-    name, title, held_out, licence : str
-        Of the data set.
-    rows : tuple of Row
-        In the order in which they were made.
-    """
-
-    name: str
+    name: str  # of the data set, as all of these
     title: str
     held_out: str
     licence: str
-    rows: tuple[Row, ...]
+    rows: tuple[Row, ...]  # in the order in which they were made
 
 
 @dataclass(frozen=True)
 class Card:
-    """A benchmark.
+    """A benchmark."""
 
-    Parameters
-    ----------
-    sections : tuple of Section
-        One per data set.
-    machine : str
-        On which it was made.
-    complete : bool
-        False if it was interrupted.
-    """
-
-    sections: tuple[Section, ...]
-    machine: str
-    complete: bool = True
+    sections: tuple[Section, ...]  # one per data set
+    machine: str  # on which it was made
+    complete: bool = True  # false if it was interrupted
 
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data, for JSON."""

@@ -21,44 +21,22 @@ TRAIN = (20.0, 100.0)  # s; the rows from 100 s on are held out
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """What is trained on, and what is predicted.
+    """What is trained on, and what is predicted."""
 
-    Parameters
-    ----------
-    training : tuple of Record
-        With the training rows selected.
-    held : tuple of Record
-        With the held-out rows selected.
-    """
-
-    training: tuple[Record, ...]
-    held: tuple[Record, ...]
+    training: tuple[Record, ...]  # with the training rows selected
+    held: tuple[Record, ...]  # with the held-out rows selected
 
 
 @dataclass(frozen=True)
 class DataSet:
-    """Public records with a rule of what is held out.
+    """Public records with a rule of what is held out."""
 
-    Parameters
-    ----------
-    name, title : str
-        For files and for tables.
-    held_out : str
-        The rule, in words.
-    smoothing : float or None
-        Time constant of the motion, s.
-    splits : callable
-        Reads a folder.
-    published : mapping of str to mapping of str to float
-        Errors that others reported: model, then record, N.
-    """
-
-    name: str
-    title: str
-    held_out: str
-    smoothing: float | None
-    splits: Callable[[Path], tuple[Split, ...]]
-    published: Mapping[str, Mapping[str, float]]
+    name: str  # for files
+    title: str  # for tables
+    held_out: str  # the rule, in words
+    smoothing: float | None  # time constant of the motion, s
+    splits: Callable[[Path], tuple[Split, ...]]  # reads a folder
+    published: Mapping[str, Mapping[str, float]]  # errors that others reported
 
 
 def _tribometer(folder: Path) -> tuple[Split, ...]:

@@ -25,24 +25,12 @@ FEW = 1500  # rows of each of several records that a fit is made with; all are p
 
 @dataclass(frozen=True, eq=False)
 class Predictor:
-    """A trained model.
+    """A trained model."""
 
-    Parameters
-    ----------
-    free : int
-        Number of unknowns.
-    predict : callable
-        Takes a record and returns the force at all of its rows, N.
-    note : str
-        What it is, if the name of the method does not say.
-    fit : Fit, optional
-        Where it came from, to start the next one.
-    """
-
-    free: int
+    free: int  # number of unknowns
     predict: Callable[[Record], FloatArray]
-    note: str = ""
-    fit: Fit | None = None
+    note: str = ""  # what it is, if the name of the method does not say
+    fit: Fit | None = None  # where it came from, to start the next one
 
 
 Train = Callable[[Sequence[Record], float | None, Predictor | None], Predictor]
@@ -50,22 +38,11 @@ Train = Callable[[Sequence[Record], float | None, Predictor | None], Predictor]
 
 @dataclass(frozen=True)
 class Method:
-    """A kind of model, and on which data sets it is tried.
+    """A kind of model, and on which data sets it is tried."""
 
-    Parameters
-    ----------
-    name : str
-        For tables.
-    train : callable
-        Takes training records, the smoothing of their motion, and the predictor of the previous
-        split, from which it may start.
-    on : tuple of str
-        Names of data sets.
-    """
-
-    name: str
+    name: str  # for tables
     train: Train
-    on: tuple[str, ...] = ("tribometer",)
+    on: tuple[str, ...] = ("tribometer",)  # names of data sets
 
 
 # --------------------------------------------------------------------------- without memory

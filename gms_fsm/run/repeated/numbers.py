@@ -51,30 +51,14 @@ def problem_with(start: Problem, given: Mapping[str, Any]) -> Problem:
 # --------------------------------------------------------------------------- numbers in a block
 @dataclass(frozen=True, eq=False)
 class KnownNumber:
-    """A number whose rules can be checked in the block, without making the system anew.
+    """A number whose rules can be checked in the block, without making the system anew."""
 
-    Parameters
-    ----------
-    place : Place
-        Where it is.
-    n : int
-        Number of elements that may differ; 0 if there is one for all.
-    bounds : tuple of Bound
-        Those of its rule that are numbers.
-    pairs : list of (Place, int, Place)
-        Which numbers must be above others, this one among them: 1, or below: -1.
-    inertias : tuple of Value
-        Those of bodies that read it.
-    nonzero : bool
-        Whether 0 is another program.
-    """
-
-    place: Place
-    n: int
-    bounds: tuple[Bound, ...]
-    pairs: list[tuple[Place, int, Place]]
-    inertias: tuple[Value, ...] = ()
-    nonzero: bool = False
+    place: Place  # where it is
+    n: int  # number of elements that may differ; 0 if there is one for all
+    bounds: tuple[Bound, ...]  # those of its rule that are numbers
+    pairs: list[tuple[Place, int, Place]]  # which must be above (1) or below (-1) others
+    inertias: tuple[Value, ...] = ()  # those of bodies that read it
+    nonzero: bool = False  # whether 0 is another program
 
     def takes(self, value: Any) -> bool:
         """Return whether a value fulfils the rule, as far as numbers alone decide."""
