@@ -35,7 +35,6 @@ from integrators.machine_code.script.javascript import javascript_text, tables_o
 from integrators.machine_code.script.placed import placed
 from integrators.machine_code.tree import Const, Local
 from integrators.machine_code.tuning import INLINE
-from integrators.runners.compiled import RecordArguments
 from integrators.runners.observing import value_rows
 
 PLACES = {
@@ -46,18 +45,15 @@ PLACES = {
     "firings": "log.firings",
 }
 ENTRIES = ("record", "adapt", "show", "values")
-VALUES = "values functions.p calm buffers.out.rows_t buffers.out.rows_y log.rows_mode shown"
+VALUES = (
+    "more.values functions.p more.calm buffers.out.rows_t buffers.out.rows_y log.rows_mode "
+    "more.shown"
+)
 
 
-class LiveWhole(NamedTuple):
-    """The arguments of all entries of a live run."""
+class LiveRun(NamedTuple):
+    """What further entries of a live run need: `more` of its arguments."""
 
-    functions: Any
-    machines: Any
-    buffers: Any
-    log: Any
-    recorded: Any
-    tally: Any
     adapting: Adapting
     table: Any  # observed values of the rows
     values: Any
@@ -97,14 +93,11 @@ def live_engine(start: Problem, title: str) -> LiveEngine:
 class _LiveModule(RunModule):
     """The module of a live page."""
 
-    def whole(self, start: Problem, run: RecordArguments, adapting: Adapting) -> Any:
-        """Return the arguments of all entries."""
-        layout, own = start.program.layout, functions(start.program)
-        return LiveWhole(
-            run.functions, run.machines, run.buffers, run.log, run.recorded, run.tally, adapting,
-            OuterArray("f", layout.observed.size), own["values"], start.program.calm,
-            OuterArray("f", max(layout.shown.size, 1)),
-        )  # fmt: skip
+    def more(self, start: Problem) -> tuple[Any, ...]:
+        """Return what further entries need."""
+        program, shown = start.program, OuterArray("f", max(start.program.layout.shown.size, 1))
+        adapting, table = super().more(start)
+        return LiveRun(adapting, table, functions(program)["values"], program.calm, shown)
 
     def entries(self, translator: Translator) -> list[str]:
         """Translate also what guards read at the rows."""

@@ -27,7 +27,7 @@ from gms_fsm.exporters._quantities import Quantity, outputs_of, parameters_of
 from gms_fsm.exporters._subject import Subject
 from gms_fsm.formats import Format, register
 from gms_fsm.foundation.text import visible
-from gms_fsm.lowering.adapting import Adapting, adapt
+from gms_fsm.lowering.adapting import OF_A_RUN, Adapting, adapt
 from gms_fsm.lowering.compiling import packed
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.problem import LATEST, Problem
@@ -43,7 +43,7 @@ from integrators.machine_code.script.javascript import javascript_text, script_n
 from integrators.machine_code.tree import Local
 from integrators.machine_code.tuning import INLINE
 from integrators.runners import columns
-from integrators.runners.compiled import RECORD, RecordArguments, is_known
+from integrators.runners.compiled import RECORD, is_known
 from integrators.runners.observing import observe_rows
 from integrators.runners.stepping import FULL_LOG
 
@@ -56,24 +56,18 @@ GROWING = {
     "log.machine": "log_machine",
     "log.edge": "log_edge",
     "log.numbers": "log_numbers",
-    "table": "table",
+    "more.table": "table",
+    "more.shown": "shown",
 }
 OBSERVED = (
     "functions machines.observe buffers.now.held buffers.sliding buffers.out.rows_t "
-    "buffers.out.rows_y log.rows_mode log.seen table"
+    "buffers.out.rows_y log.rows_mode log.seen more.table"
 )
-OF_A_RUN = "functions buffers log.seen buffers.sliding.live adapting"  # as in STEPS
 
 
-class Whole(NamedTuple):
-    """The arguments of all entries of a run."""
+class WholeRun(NamedTuple):
+    """What further entries of a run need: `more` of its arguments."""
 
-    functions: Any
-    machines: Any
-    buffers: Any
-    log: Any
-    recorded: Any
-    tally: Any
     adapting: Adapting
     table: Any  # observed values of the rows
 
@@ -287,14 +281,12 @@ class RunModule(_Module):
                 place="settings",
                 advice='leave method and output out, or choose method="dp45"',
             )
-        whole = self.whole(start, example_of(start), adapting_of(start))
+        whole = example_of(start)._replace(more=self.more(start))
         super().__init__(subject, start, whole, alone=False)
 
-    def whole(self, start: Problem, run: RecordArguments, adapting: Adapting) -> Any:
-        """Return the arguments of all entries."""
-        table: Any = OuterArray("f", start.program.layout.observed.size)
-        parts = run.functions, run.machines, run.buffers, run.log, run.recorded, run.tally
-        return Whole(*parts, adapting, table)
+    def more(self, start: Problem) -> tuple[Any, ...]:
+        """Return what further entries need."""
+        return WholeRun(adapting_of(start), OuterArray("f", start.program.layout.observed.size))
 
     def entries(self, translator: Translator) -> list[str]:
         """Translate the run, what follows from its numbers, and what is observed of its rows."""
