@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm.charts.constants import named_constants
 from gms_fsm.charts.gms import GMS_ELEMENT
 from gms_fsm.charts.parameters import SIGMA_2, WEIGHTS, FloatArray, Parameter, adapted
 from gms_fsm.errors import ParameterError
@@ -237,6 +236,8 @@ def joined(what: Mounted, parts: Iterable[tuple[str, int | None, float]]) -> dic
 # --------------------------------------------------------------------------- numbers in guards
 def with_named_constants(what: Mounted) -> tuple[Mounted, frozenset[str]]:
     """Return the same with parameters in place of the numbers in guards, and their names."""
+    from gms_fsm.charts.constants import named_constants  # reads charts as files are: pydantic
+
     names: set[str] = set()
 
     def named(each: Contact) -> Contact:

@@ -106,7 +106,7 @@ def run() -> dict[str, Any]:
     found = {F_s: bowed(F_s, F_s / 3) for F_s in FORCES}
     cycle = found[F_S]
     replayed = {f"{F_S:g} N": cycle.trace}
-    fine = cycle.trace.sample(np.linspace(*cycle.trace.t[[0, -1]], ROWS))
+    fine = cycle.trace.sample(np.linspace(cycle.trace.t[0], cycle.trace.t[-1], ROWS))
     v, push = fine.v + SPEED, -fine.F  # of the string, and what the bow does to it
     place = fine.x + SPEED * fine.t
     swing, power = 0.5e6 * np.ptp(place), push * v  # um, W
