@@ -204,6 +204,7 @@ class Follower:
         self.taken = 0  # of the requested times
         self.arc: tuple[Modes, list[float]] | None = None
         self.arcs = Arcs(self.linear, self.options)
+        self.guarded: dict[tuple[int, ...], list[int]] = {}
         self.before: tuple[float, list[float]] = t, list(y)
 
     # ------------------------------------------------------------------ the run
@@ -466,6 +467,8 @@ class Follower:
 
     def guards(self, each: _Operation) -> list[int]:
         """Return the relations in the guard of an edge."""
+        if each.numbers in self.guarded:
+            return self.guarded[each.numbers]
         edge, machine = each.numbers
         plan = self.program.plan
         place = self.program.layout.bank(machine)
@@ -474,6 +477,7 @@ class Follower:
         for comparison in comparisons(split(bank.edges[edge - place.first_edge].guard)):
             if comparison in plan.relations.shared or comparison in plan.relations.own:
                 found.append(plan.relations.index(comparison, machine - place.first))
+        self.guarded[each.numbers] = found
         return found
 
     def check(self, c: _Crossing, t_t: FloatArray, rates: FloatArray) -> None:

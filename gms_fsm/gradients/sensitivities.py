@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -44,10 +44,13 @@ class Sensitivities:
         By what it was differentiated.
     followed : Followed
         The tangents.
+    seen : dict
+        Those of observed quantities that were asked for, by name.
     """
 
     directions: Directions
     followed: Followed
+    seen: dict[str, FloatArray] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -80,23 +83,17 @@ class Sensitivities:
         if name in layout.y.shared or name in layout.y.own:
             made: FloatArray = self.followed.rows[:, layout.y.where(name), c]
             return made
-        where = layout.observed.where(name)
-        linear, found = Linear(program, self._one(c)), []
-        table = zip(rows.t.tolist(), rows.y.tolist(), rows.mode.tolist(), strict=True)
-        for row, (t, y, mode) in enumerate(table):
-            tangent = self.followed.rows[row, :, c : c + 1]
-            found.append(linear.observe(t, y, mode, tangent)[where, 0])
-        return np.array(found)
-
-    def _one(self, c: int) -> Directions:
-        d, only = self.directions, slice(c, c + 1)
-        return Directions(
-            d.names[only],
-            {k: row[only] for k, row in d.shared.items()},
-            {k: table[:, only] for k, table in d.own.items()},
-            d.y[:, only],
-            d.scales[only],
-        )
+        if name not in self.seen:  # of all directions at once
+            where, linear = layout.observed.where(name), Linear(program, self.directions)
+            table = zip(
+                rows.t.tolist(),
+                rows.y.tolist(),
+                rows.mode.tolist(),
+                self.followed.rows,
+                strict=True,
+            )
+            self.seen[name] = np.array([linear.observe(*row)[where] for row in table])
+        return self.seen[name][..., c]
 
 
 def _name(layout: SystemLayout, of: str, which: str) -> str:
