@@ -30,8 +30,8 @@ EXACT = 2**53  # whole numbers that are floats
 
 def with_given(what: Mounted, given: Mapping[str, Any]) -> Mounted:
     """Return the same with other numbers, whole parameters or those of single elements."""
-    whole, single = known_in(what), numbers_of(what)
-    parts: dict[str, Any] = {}
+    whole, parts = known_in(what), dict[str, Any]()
+    single = {} if {*given} <= {*whole} else numbers_of(what)
     for name, value in given.items():
         if name in whole:
             parts[name] = value
@@ -45,7 +45,7 @@ def with_given(what: Mounted, given: Mapping[str, Any]) -> Mounted:
 
 def problem_with(start: Problem, given: Mapping[str, Any]) -> Problem:
     """Return a problem with other numbers; a `ParameterError` if one breaks its rule."""
-    return start.with_numbers(with_given(start.what, given))
+    return start.with_numbers(with_given(start.what, given)) if given else start
 
 
 # --------------------------------------------------------------------------- numbers in a block
