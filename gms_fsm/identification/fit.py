@@ -82,7 +82,7 @@ def fit(
     train: tuple[float, float] | None = None,
     test: tuple[float, float] | None = None,
     cycles: float | None = None,
-    search: Literal["hops", "local", "de"] = "hops",
+    search: Literal["hops", "local"] = "hops",
     bounds: Mapping[str, tuple[float, float]] | None = None,
     seed: int = 0,
     most_steps: int | None = None,
@@ -124,9 +124,9 @@ def fit(
         at once, when `Fit.held_out` is asked for.
     cycles : float, optional
         Period of the record, s: for the repeatability floor and the blocks of a bootstrap.
-    search : {"hops", "local", "de"}
+    search : {"hops", "local"}
         Hops (perturb, refine, keep the best) find the global minimum most often; ``"local"``
-        refines the start values, ``"de"`` is differential evolution.
+        refines the start values.
     bounds : mapping of str to (float, float), optional
         Lowest and highest values. By default a positive number is searched from a thousandth to a
         thousand times its start.
@@ -273,25 +273,7 @@ def task_of(
     fixed: Mapping[str, ArrayLike],
     options: FitOptions,
 ) -> Task:
-    """Return what is fitted to what, checked.
-
-    Parameters
-    ----------
-    records, model, fixed
-        As in `fit`.
-    options : FitOptions
-        All other arguments.
-
-    Returns
-    -------
-    Task
-        Ready to be searched.
-
-    Raises
-    ------
-    ParameterError, RecordError
-        As in `fit`.
-    """
+    """Return what is fitted to what, checked."""
     every = checked_records(records)
     names = {name: None for record in every for name in record.inputs}
     subject = _with_fixed(mounted_alone(model, inputs=names), fixed, options.free)
@@ -418,12 +400,11 @@ def _check_linear(task: Task) -> None:
         here = task.subject
         value = value_of(here, each)
         there = varied(here, values_by_key(here, [each], [1.5 * value or 1.0]))
-        _, rest, columns = experiment.columns(here, course)
-        _, other_rest, others = experiment.columns(there, course)
+        start, other = experiment.coordinates.start, replace(experiment, subject=there)
+        change = other.modelled_once(start, course) - experiment.modelled_once(start, course)
         # Where only the force depends on a parameter, no other term of it changes.
-        sizes = np.array([abs(value_of(here, one)) for one in experiment.solved])
-        terms = np.abs(columns - others)[:, : len(sizes)] * sizes
-        moved = max(float(np.abs(rest - other_rest).max()), float(terms.max()))
+        sizes = np.array([1.0, *(abs(value_of(here, one)) for one in experiment.solved)])
+        moved = float(np.abs(change[:, : sizes.size] * sizes).max())
         if moved > 1e-6 * experiment.typical:
             raise ParameterError(
                 f"the force is not linear in {each.name!r}: with another value the elements move "
@@ -435,27 +416,7 @@ def _check_linear(task: Task) -> None:
 
 # --------------------------------------------------------------------------- the search
 def fitted(task: Task, *, progress: bool | None = False, intervals: bool = True) -> Fit:
-    """Return the fit of a task.
-
-    Parameters
-    ----------
-    task : Task
-        From `task_of`.
-    progress : bool or None
-        As in `fit`.
-    intervals : bool
-        Whether to find out how sure the parameters are, which takes as long as a local search.
-
-    Returns
-    -------
-    Fit
-        The best found.
-
-    Raises
-    ------
-    ParameterError
-        If no proposal could be run.
-    """
+    """Return the fit of a task."""
     began, stopped = time.perf_counter(), ""
     coarse, fine = Best(), Best()
     with ThreadPool() as pool:

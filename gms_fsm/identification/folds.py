@@ -29,20 +29,10 @@ Parts: TypeAlias = tuple[tuple[tuple[Record, ...], tuple[Record, ...]], ...]
 
 @dataclass(frozen=True, eq=False)
 class Folds:
-    """What is fitted to and what is left out, in few rows.
+    """What is fitted to and what is left out, in few rows."""
 
-    Parameters
-    ----------
-    all : tuple of Record
-        Everything.
-    parts : tuple of (tuple of Record, tuple of Record)
-        Fitted to, and left out.
-    others : mapping of str to parts
-        By amplitude and by speed, where records differ in them.
-    """
-
-    all: tuple[Record, ...]
-    parts: Parts
+    all: tuple[Record, ...]  # everything
+    parts: Parts  # fitted to, and left out
     others: Mapping[str, Parts] = field(default_factory=dict)
 
 

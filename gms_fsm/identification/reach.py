@@ -51,9 +51,9 @@ class Reach:
 
 def reach_of(experiment: Experiment, subject: Mounted, course: Course) -> Reach:
     """Return the reach of one course."""
-    ran = experiment.driver.run(subject, course)
-    trace, layout = ran.trace, ran.program.layout
-    force = np.abs(experiment.measured.values(ran))
+    trace = experiment.driver.run(subject, course)
+    layout = trace.program.layout
+    force = np.abs(experiment.measured.values(trace))
     speed = np.abs(course.v)
     times = trace.firings.t
     changes = np.interp(times[times >= course.t[0]], course.t, speed)
@@ -95,7 +95,7 @@ def predicted(fit: Fit, record: Record, initial: Any, lead: float) -> FloatArray
     along, fine = fit.task.along(record, None), fit.task.fine
     if initial == "estimate":
         tau = correlation_time(stretches(fit.task.courses, fit.point.residual))
-        along = [each.begun(estimated(fine, fit.point, each, lead, tau)) for each in along]
+        along = [each.begun(estimated(fit.task, fit.point, each, lead, tau)) for each in along]
     elif initial is not None:
         checked_kind("initial", initial, Mapping, "'estimate', or a mapping such as {'z': 0}")
         along = [along[0].begun(initial), *along[1:]]
@@ -108,7 +108,7 @@ def without_change(experiment: Experiment, subject: Mounted) -> tuple[int, ...]:
         return ()
     kept: NDArray[np.bool_] = np.array(True)
     for course in experiment.courses:
-        trace = experiment.driver.run(subject, course).trace
+        trace = experiment.driver.run(subject, course)
         elements = trace.program.layout.elements
         initial = experiment.driver.start(subject, course).mode[elements]
         same = (trace.rows.mode[course.rows, elements] == initial).all(axis=0)

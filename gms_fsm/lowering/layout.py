@@ -256,6 +256,12 @@ class SystemLayout:
                 seen.append([v, s, F])
         return own, seen
 
+    def place(self, name: str, element: int = 0) -> int:
+        """Return the place of a value in the state, or after it among what is observed."""
+        if name in (*self.y.shared, *self.y.own):
+            return self.y.index(name, element)
+        return self.y.size + self.observed.index(name, element)
+
     # ------------------------------------------------------------------ modes
     @cached_property
     def modes(self) -> int:

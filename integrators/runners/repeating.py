@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from integrators.loop import ROWS, Buffers, Machines
+from integrators.loop import DONE, ROWS, Buffers, Machines
 from integrators.runners.columns import LogColumns, put_modes
 from integrators.runners.observing import observe_row
 from integrators.sliding import Functions, Held
@@ -25,11 +25,19 @@ class Repeats(NamedTuple):
     first: list[int]  # its contents at the beginning
     scale: list[int]  # the word of the time scale
     rows: list[int]  # of each number: its place among the shared ones, or its row
-    columns: list[int]  # its element; -1 for a shared one
+    columns: list[int]  # its element; -1 for a shared one, -2 for an initial value in that row
     values: list[Vector]  # of each run, then of each number
     end: list[Vector]  # of each run: the time, the state, what is observed
     mode: list[list[int]]  # of each run: the modes of a row
     counts: list[list[int]]  # of each run: the last event, and the number of firings
+    # Of rows: places of a value and of what says its slopes, in the state or after it among what
+    # is observed; numbers that are moved, with the slope that each says (0: none); where the cells
+    # of each pass begin; by how much they are moved; of each run, then of each row, all of them.
+    kept: list[int]
+    cells: list[list[int]]  # row, column, slope
+    passes: list[int]
+    steps: Vector
+    table: list[Vector]  # empty: of runs the ends
 
 
 def repeat(
@@ -58,7 +66,9 @@ def repeat(
         values, end, mode = repeats.values[run], repeats.end[run], repeats.mode[run]
         for j in range(len(values)):
             row, column = repeats.rows[j], repeats.columns[j]
-            if column < 0:
+            if column < -1:
+                now.y[row] = values[j]
+            elif column < 0:
                 shared[row] = values[j]
             else:
                 own[row][column] = values[j]
@@ -72,9 +82,59 @@ def repeat(
         repeats.counts[run][1] = log.firings - fired
         put_modes(now.mode, b.sliding.flags, mode)
         observe_row(machines.observe, on, now.t, now.y, mode, log.seen)
+        if len(repeats.table) > 0:
+            log.firings = fired  # of rows no log is kept
+            if event == DONE:
+                put_slopes(machines, on, b, log, repeats, run * b.out.row)
         end[0] = now.t
         for j in range(size):
             end[1 + j] = now.y[j]
         for k in range(len(log.seen)):
             end[1 + size + k] = log.seen[k]
     return count
+
+
+def put_slopes(
+    machines: Machines, on: Held, b: Buffers, log: LogColumns, repeats: Repeats, first: int
+) -> None:
+    """Write a value of each row and its slopes: differences, which are exact where it is linear."""
+    shared, own, _ = on.functions.p
+    cells, steps, size = repeats.cells, repeats.steps, len(b.now.y)
+    for k in range(len(cells)):
+        row, column = cells[k][0], cells[k][1]
+        steps[k] = shared[row] if column < 0 else own[row][column]
+        if steps[k] == 0.0:
+            steps[k] = 1.0
+    for i in range(b.out.row):
+        t, y, mode, kept = (
+            b.out.rows_t[i],
+            b.out.rows_y[i],
+            log.rows_mode[i],
+            repeats.table[first + i],
+        )
+        observe_row(machines.observe, on, t, y, mode, log.seen)
+        for j in range(len(repeats.kept)):
+            place = repeats.kept[j]
+            kept[j] = y[place] if place < size else log.seen[place - size]
+        for q in range(len(repeats.passes) - 1):
+            start, end = repeats.passes[q], repeats.passes[q + 1]
+            for k in range(start, end):
+                _add(on.functions.p, cells[k], steps[k])
+            observe_row(machines.observe, on, t, y, mode, log.seen)
+            for k in range(start, end):
+                _add(on.functions.p, cells[k], -steps[k])
+                j = cells[k][2]
+                if j > 0:
+                    place = repeats.kept[j]
+                    moved = y[place] if place < size else log.seen[place - size]
+                    kept[j] = (moved - kept[j]) / steps[k]
+
+
+def _add(p: Any, cell: list[int], by: float) -> None:
+    """Add to a number."""
+    shared, own, _ = p
+    row, column = cell[0], cell[1]
+    if column < 0:
+        shared[row] += by
+    else:
+        own[row][column] += by

@@ -34,6 +34,7 @@ def _lag(rate: float, **options: Any) -> Any:
 
 @pytest.mark.matrix
 def test_a_proposal_costs_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What fails with others in machine code is run again alone, for the reason."""
     lost = 0
     own = runs.Driver.run
 

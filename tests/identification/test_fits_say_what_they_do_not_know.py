@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Chart, ChartModel, Fit, Record, State
+from gms_fsm.errors import GMSError
 from gms_fsm.identification.certainty.assess import _searched_slopes
 from tests.identification.records import bank, fitted, measured, plain, sine
 
@@ -109,13 +110,14 @@ def test_a_slope_is_taken_on_the_side_that_runs() -> None:
     found = plain()
 
     def slopes(lost: int, step: float = 1e-4) -> Any:
-        sides = iter((1, 2))
+        gone = GMSError("lost")
 
         def run(call: Any, given: Any) -> Any:
-            return [None if side == lost else call(u) for side in [next(sides)] for u in given]
+            sides = enumerate(given, 1)
+            return [[gone] * len(part) if side == lost else call(part) for side, part in sides]
 
         steps = np.full(found.point.u.size, step)
-        pool: Any = SimpleNamespace(map=run)
+        pool: Any = SimpleNamespace(workers=2, map=run)
         return _searched_slopes(found.task.fine, found.point, steps, pool)
 
     both = slopes(0)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gms_fsm.charts.parameters import WEIGHTS, FloatArray
+from gms_fsm.errors import GMSError
 from gms_fsm.identification.certainty.profile import Profile, shown_interval
 from gms_fsm.identification.certainty.region import Region, walked
 from gms_fsm.identification.certainty.statistics import (
@@ -21,7 +22,7 @@ from gms_fsm.identification.certainty.statistics import (
     correlation_time,
 )
 from gms_fsm.identification.problem.experiment import MASS, NUISANCE, Experiment, Point
-from gms_fsm.identification.problem.runs import LOST, ThreadPool
+from gms_fsm.identification.problem.runs import ThreadPool
 from gms_fsm.identification.problem.task import Task, stretches
 from gms_fsm.identification.problem.unknowns import Unknown
 from gms_fsm.systems.mounted import Mounted
@@ -83,31 +84,14 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Assessed:
-    """What is known about the unknowns of a fit.
-
-    Parameters
-    ----------
-    table : tuple of Estimate
-        The parameters in the order they were asked for, then the nuisance terms.
-    covariance : ndarray, shape (p, p)
-        Of their values, in the order of the table.
-    certainty : Certainty
-        In coordinates.
-    weakest : str
-        The weakest direction in words.
-    better : Point or None
-        A point met on the walk that fits clearly better on few rows.
-    open_profiles : tuple of Profile
-        Of the parameters that cannot be told: the least rise met on the walk through the region
-        in which the fit is as good. A profile is at most as high.
-    """
+    """What is known about the unknowns of a fit."""
 
     table: tuple[Estimate, ...]
-    covariance: FloatArray
-    certainty: Certainty
-    weakest: str
-    better: Point | None = None
-    open_profiles: tuple[Profile, ...] = ()
+    covariance: FloatArray  # shape (p, p); Of their values, in the order of the table
+    certainty: Certainty  # in coordinates
+    weakest: str  # the weakest direction in words
+    better: Point | None = None  # A point met on the walk that fits clearly better on few rows
+    open_profiles: tuple[Profile, ...] = ()  # of the parameters that cannot be told
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,15 +207,10 @@ def _shift_of_smoothing(task: Task, point: Point, slopes: FloatArray) -> FloatAr
     if not used:
         return None
     less = replace(task, options=replace(task.options, smoothing=0.5 * min(used)))
-    try:
-        subject = less.fine.reference(less.fine.coordinates.numbers(point.u))
-        parts = []
-        for course in less.fine.courses:
-            _, rest, columns = less.fine.columns(subject, course)
-            parts.append((rest + columns @ point.linear)[course.rows])
-    except LOST:
+    force = less.fine.forces([point.u], point.linear)[0]
+    if force is None:
         return None
-    change = less.fine.weighted(parts) - point.residual - task.fine.target
+    change = force - point.residual - task.fine.target
     moved: Any = np.linalg.lstsq(slopes, change, rcond=1e-6)[0]
     found: FloatArray = -16.0 / 15.0 * moved
     return found
@@ -345,30 +324,20 @@ def _in_values(
 
 
 def _basis(experiment: Experiment, point: Point) -> FloatArray:
-    subject = experiment.reference(experiment.coordinates.numbers(point.u))
-    columns = [experiment.columns(subject, course)[2][course.rows] for course in experiment.courses]
-    return experiment.weighted(columns)
+    found = experiment.every([point.u])[0]
+    if isinstance(found, GMSError):
+        raise found
+    return found[:, 1:]
 
 
 def _searched_slopes(
     experiment: Experiment, point: Point, steps: FloatArray, pool: ThreadPool
 ) -> FloatArray:
     """Return secants of the force by each searched coordinate, linear parameters held."""
-
-    def force(u: FloatArray) -> FloatArray | None:
-        try:
-            subject = experiment.reference(experiment.coordinates.numbers(u))
-            parts = []
-            for course in experiment.courses:
-                _, rest, columns = experiment.columns(subject, course)
-                parts.append((rest + columns @ point.linear)[course.rows])
-        except LOST:
-            return None
-        return experiment.weighted(parts)
-
     moves = [step * unit for step, unit in zip(steps, np.eye(steps.size), strict=True)]
-    forward = pool.map(force, [point.u + move for move in moves])
-    backward = pool.map(force, [point.u - move for move in moves])
+    places = [point.u + sign * move for sign in (1.0, -1.0) for move in moves]
+    found = experiment.forces(places, point.linear, pool)
+    forward, backward = found[: steps.size], found[steps.size :]
     here = point.residual + experiment.target
     slopes = np.zeros((here.size, steps.size))
     for i, (step, ahead, behind) in enumerate(zip(steps, forward, backward, strict=True)):

@@ -51,28 +51,13 @@ class _Walk:
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """What was met on a walk through the likelihood region.
+    """What was met on a walk through the likelihood region."""
 
-    Parameters
-    ----------
-    best : mapping of str to float
-        The values of the best point, by name.
-    met : mapping of str to ndarray, shape (points,)
-        Those of all points met, the best one first.
-    rise : ndarray, shape (points,)
-        Fall of twice the log-likelihood at each.
-    lowest : Point
-        The point with the lowest cost.
-    shares : mapping of str to float
-        Of the highest rise inside the region, by name: noise that is correlated moves what acts
-        fast less than what acts slowly, on which all effective rows count.
-    """
-
-    best: dict[str, float]
-    met: dict[str, FloatArray]
-    rise: FloatArray
-    lowest: Point
-    shares: dict[str, float]
+    best: dict[str, float]  # the values of the best point, by name
+    met: dict[str, FloatArray]  # shape (points,); Those of all points met, the best one first
+    rise: FloatArray  # shape (points,); Fall of twice the log-likelihood at each
+    lowest: Point  # the point with the lowest cost
+    shares: dict[str, float]  # of the highest rise inside the region, by name
 
     @property
     def better(self) -> Point | None:
@@ -152,7 +137,7 @@ def walked(
         for far in ALONE
         for side in (-1.0, 1.0)
     ]
-    points = pool.map(experiment.at, alone)
+    points = experiment.many(alone, pool)
     take(points, [_rise(each, point.cost, rows) for each in points])
     for _ in range(ROUNDS):
         moves = [
@@ -162,7 +147,7 @@ def walked(
         places = [
             np.clip(walk.place + move, low, high) for walk, move in zip(walks, moves, strict=True)
         ]
-        points = pool.map(experiment.at, places)
+        points = experiment.many(places, pool)
         new = [_rise(each, point.cost, rows) for each in points]
         for walk, rise in zip(walks, new, strict=True):
             inside = rise < LIMIT * shares[walk.name]

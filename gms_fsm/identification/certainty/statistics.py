@@ -68,37 +68,17 @@ def correlation_time(parts: Sequence[FloatArray]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Certainty:
-    """What the data say about all unknowns together, in coordinates.
+    """What the data say about all unknowns together, in coordinates."""
 
-    Parameters
-    ----------
-    covariance : ndarray, shape (p, p)
-        Of the coordinates; infinite on the diagonal for those that cannot be told.
-    half : ndarray, shape (p,)
-        Half widths of the 95 % intervals of the coordinates.
-    open : ndarray of bool, shape (p,)
-        Which cannot be told.
-    directions : ndarray, shape (p, p)
-        Combinations of the coordinates, from the best determined to the least.
-    spread : ndarray, shape (p,)
-        How far each can move within the noise (one standard deviation).
-    share : ndarray, shape (p,)
-        Variance of each as a share of that of a slow parameter, for which rows / tau count.
-    tau, effective : float
-        Correlation time of the noise in rows, and the number of rows that count.
-    beyond : float
-        Correlation time in rows of what is left without that noise: 1 if that may be chance.
-    """
-
-    covariance: FloatArray
-    half: FloatArray
-    open: FloatArray
-    directions: FloatArray
-    spread: FloatArray
-    share: FloatArray
-    tau: float
-    effective: float
-    beyond: float = 1.0
+    covariance: FloatArray  # shape
+    half: FloatArray  # shape (p,); Half widths of the 95 % intervals of the coordinates
+    open: FloatArray  # shape (p,); Which cannot be told
+    directions: FloatArray  # shape
+    spread: FloatArray  # shape
+    share: FloatArray  # shape
+    tau: float  # correlation time of the noise in rows, and the number of rows that count
+    effective: float  # correlation time of the noise in rows, and the number of rows that count
+    beyond: float = 1.0  # correlation time in rows of what is left without that noise
 
 
 def certainty(

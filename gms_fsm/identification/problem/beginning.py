@@ -1,56 +1,108 @@
 """The state in which a record begins, where nothing that is known leads to it.
 
-The first stretch of the force tells it as far as it can; a prior, the range of states in training,
-decides what it cannot tell: in the middle of a play every deflection gives the same force.
+The first stretch of the force tells it as far as it can. What it cannot tell, such as a deflection
+in the middle of a play, is as in training: a state that the elements had there together, rather
+where the motion was nearly the same.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import RecordError
 from gms_fsm.identification.problem.experiment import Experiment, Point
-from gms_fsm.identification.problem.runs import COVERED, LOST, Course
+from gms_fsm.identification.problem.runs import COVERED, LOST, Course, CourseRuns
 from gms_fsm.identification.problem.task import Task
+from gms_fsm.run.problem import Problem
+from gms_fsm.systems.mounted import Mounted
 
-ALIKE = 13  # first guesses: all elements alike, or all pulled by the same way
-ALONE = 3  # values of one element at a time
-ANYHOW = 20  # first guesses at random, times the number of values
-PASSES = 1
+FROM_TRAINING, ANYHOW = 200, 100  # first guesses: states of training rows, and others
+NEAR = 0.3  # of the travel and of the highest speed: how far a row in training may be
+STRAY = 0.5  # of half the range of a variable: how far it may be from the state in training
+SEEDS, STEPS = 3, 8  # the best of the guesses, which are refined, and how often
+STEP, LENGTHS = 1e-3, (1.0, 0.5, 0.2, 0.05)  # of differences, of half the range; parts of a step
 MOST_ROWS = 400
 ROUNDS = 2  # of states and parameters in turn
 
 State = Mapping[str, FloatArray]
 
 
-def state_ranges(experiment: Experiment, point: Point) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return the lowest and highest values of each state variable in training, by its name."""
-    subject, found = experiment.fitted(point), dict[str, tuple[FloatArray, FloatArray]]()
-    for course in experiment.courses:
-        ran = experiment.driver.run(subject, course)
-        layout = ran.program.layout
-        for bank in layout.banks:
-            for variable in bank.variables:
-                name = bank.of(variable)
-                values = np.asarray(ran.trace.rows.y[:, layout.y.where(name)])
-                values = values.reshape(len(values), -1)
-                low, high = values.min(axis=0), values.max(axis=0)
-                label = layout.label(name)
-                if label in found:
-                    low = np.minimum(low, found[label][0])
-                    high = np.maximum(high, found[label][1])
-                found[label] = low, high
-    return found
+@dataclass(frozen=True, eq=False)
+class _Starts:
+    """The runs along the beginning of a course, from any states; those of training beside.
+
+    A state is a row of numbers, one for each element of each variable in `widths`.
+    """
+
+    experiment: Experiment
+    subject: Mounted
+    course: Course
+    terms: FloatArray  # of the nuisance terms
+    start: Problem
+    runs: CourseRuns
+    widths: Mapping[str, int]
+    seen: FloatArray  # states in training, shape (rows, values), those of nearest rows first
+    apart: FloatArray  # how far these rows are
+
+    def named(self, state: FloatArray) -> dict[str, FloatArray]:
+        """Return a state by the names of its variables."""
+        parts = np.split(state, np.cumsum([*self.widths.values()])[:-1])
+        return dict(zip(self.widths, parts, strict=True))
+
+    def forces(self, states: FloatArray) -> FloatArray:
+        """Return the force at the rows from each of some states; NaN where a run fails."""
+        course, experiment = self.course, self.experiment
+        others = experiment.nuisance_columns(course)
+        found = np.full((len(states), course.t.size), np.nan)
+        if self.runs.known:
+            keys = self.start.program.layout.keys
+            names = [keys[name] for name in self.widths]
+            which, tables = self.runs.from_states(names, states, others)
+            found[which] = tables[:, :, 0]
+        else:
+            for i, state in enumerate(states):
+                try:
+                    trace = experiment.driver.run(self.subject, course.begun(self.named(state)))
+                except LOST:
+                    continue
+                found[i] = experiment.measured.values(trace)
+        return found + others @ self.terms
+
+
+def _begun(task: Task, point: Point, course: Course) -> _Starts | None:
+    """Return the runs of a course; None where the force has no memory."""
+    coarse, fine = task.coarse, task.fine
+    subject = fine.fitted(point)
+    seen, near, widths = list[FloatArray](), list[FloatArray](), dict[str, int]()
+    fastest = max(float(np.abs(each.v).max()) for each in coarse.courses) or 1.0
+    travel = max(float(np.ptp(each.x)) for each in coarse.courses) or 1.0
+    for each in coarse.courses:
+        trace = coarse.driver.run(subject, each)
+        layout = trace.program.layout
+        names = [bank.of(variable) for bank in layout.banks for variable in bank.variables]
+        widths = {layout.label(name): len(layout.y.all_of(name)) for name in names}
+        parts = [trace.rows.y[:, layout.y.where(name)].reshape(len(each.t), -1) for name in names]
+        seen.append(np.hstack([np.empty((len(each.t), 0)), *parts]))
+        apart = np.hypot((each.x - course.x[0]) / travel, (each.v - course.v[0]) / fastest)
+        near.append(apart)
+    if not widths:
+        return None
+    states, apart = np.concatenate(seen), np.concatenate(near)
+    order = np.argsort(apart, kind="stable")
+    begun = course.begun({name: np.zeros(n) for name, n in widths.items()})
+    start = fine.driver.start(subject, begun)
+    runs = CourseRuns(start, fine.measured, (), ())
+    terms = point.linear[len(fine.solved) :]
+    there = states[order], apart[order]
+    return _Starts(fine, subject, course, terms, start, runs, widths, *there)
 
 
 def estimated(
-    experiment: Experiment, point: Point, course: Course, lead: float, tau: float
+    task: Task, point: Point, course: Course, lead: float, tau: float
 ) -> dict[str, FloatArray]:
     """Return the state at the first row of a course, from the force of its first seconds."""
     first = course.t <= course.t[0] + lead
@@ -63,48 +115,56 @@ def estimated(
         )
     short = short.ended()
     short = short.thinned(max(1, short.t.size // MOST_ROWS))
-    subject, ranges = experiment.fitted(point), state_ranges(experiment, point)
-    if not ranges:  # a force without a memory
+    starts = _begun(task, point, short)
+    if starts is None:
         return {}
-    terms = point.linear[len(experiment.solved) :]
-    low, high = (np.concatenate([each[i] for each in ranges.values()]) for i in (0, 1))
-    middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-300)
-    ends = np.cumsum([each[0].size for each in ranges.values()])[:-1]
+    seen, experiment = starts.seen, starts.experiment
+    half = np.maximum(0.5 * np.ptp(seen, axis=0), 1e-300)
     noise = max(point.cost / max(point.residual.size, 1), (1e-6 * experiment.typical) ** 2)
     count = max(float(short.rows.sum()) / tau, 1.0)
+    share = np.sqrt(count / short.rows.sum() / noise)
 
-    def state(q: FloatArray) -> dict[str, FloatArray]:
-        values = np.split(middle + np.clip(q, -1.0, 1.0) * half, ends)
-        return dict(zip(ranges, values, strict=True))
+    def errors(states: FloatArray) -> FloatArray:
+        found: FloatArray = share * (starts.forces(states) - short.measured)[:, short.rows]
+        return found
 
-    def cost(q: FloatArray) -> float:
-        begun = short.begun(state(q))
-        try:
-            ran = experiment.driver.run(subject, begun)
-        except LOST:
-            return np.inf
-        model = experiment.measured.values(ran) + experiment.nuisance_columns(begun) @ terms
-        error = (model - begun.measured)[begun.rows]
-        return count * float(error @ error) / error.size / noise + float(q @ q)
+    few = FROM_TRAINING // 2
+    some = np.append(
+        np.arange(min(few, len(seen))), np.arange(few, len(seen), 1 + len(seen) // few)
+    )
+    known, far = seen[some] / half, starts.apart[some] / NEAR
+    middle = 0.5 * (known.min(axis=0) + known.max(axis=0))
+    drawn = middle + np.random.default_rng(0).uniform(-1.0, 1.0, (ANYHOW, half.size))
+    strays = ((drawn[:, None] - known) ** 2).sum(axis=2) / STRAY**2 + far**2
+    anchors = np.append(np.arange(some.size), strays.argmin(axis=1))
+    guesses = np.concatenate([known, drawn])
+    prior = np.append(far**2, strays.min(axis=1))
 
-    pulled = np.linspace(low.min(), high.max(), ALIKE)
-    guesses = [np.full(low.size, share) for share in np.linspace(-1.0, 1.0, ALIKE)]
-    guesses += [np.clip((each - middle) / half, -1.0, 1.0) for each in pulled]
-    # Elements share a force: each by itself cannot leave the sum that fits at the start.
-    guesses += [*np.random.default_rng(0).uniform(-1.0, 1.0, (ANYHOW * low.size, low.size))]
-    least, best = min(((cost(q), i) for i, q in enumerate(guesses)))
-    found = guesses[best]
-    for _ in range(PASSES):
-        for i in range(found.size):
-            for share in np.linspace(-1.0, 1.0, ALONE):
-                other = found.copy()
-                other[i] = share
-                if (there := cost(other)) < least:
-                    least, found = there, other
-    bounds = [(-1.0, 1.0)] * found.size
-    options: Any = {"maxfev": 25 * found.size, "xtol": 1e-3, "ftol": 1e-3}
-    polished = minimize(cost, found, method="Powell", bounds=bounds, options=options)
-    return state(polished.x if polished.fun < least else found)
+    def costs(found: FloatArray) -> FloatArray:
+        sums: FloatArray = np.nan_to_num((found**2).sum(axis=1), nan=np.inf)
+        return sums
+
+    every = costs(errors(guesses * half)) + prior
+    best, least = guesses[every.argmin()], float(every.min())
+    for i in np.argsort(every, kind="stable")[:SEEDS]:
+        q, anchor, cost = guesses[i], known[anchors[i]], float(every[i])
+        for _ in range(STEPS):
+            nearby = np.concatenate([q[None], q + STEP * np.eye(q.size)])
+            here, *moved = errors(nearby * half)
+            slopes = np.nan_to_num((np.array(moved) - here) / STEP)
+            pull = (q - anchor) / STRAY**2
+            step = np.linalg.solve(
+                slopes @ slopes.T + np.eye(q.size) / STRAY**2, -(slopes @ here + pull)
+            )
+            tries = q + np.outer(LENGTHS, step)
+            stray = ((tries - anchor) ** 2).sum(axis=1) / STRAY**2 + far[anchors[i]] ** 2
+            there = costs(errors(tries * half)) + stray
+            if not there.min() < cost * (1.0 - 1e-3):
+                break
+            q, cost = tries[there.argmin()], float(there.min())
+        if cost < least:
+            best, least = q, cost
+    return starts.named(best * half)
 
 
 def with_states(task: Task, point: Point, tau: float) -> Task:
@@ -117,5 +177,5 @@ def with_states(task: Task, point: Point, tau: float) -> Task:
         covered = np.maximum.accumulate(course.x) - np.minimum.accumulate(course.x)
         until = int(np.argmax(covered >= COVERED * covered[-1]))  # then the state is forgotten
         lead = float(course.t[max(until, min(MOST_ROWS, course.t.size - 1))] - course.t[0])
-        starts[place] = estimated(task.fine, point, course, lead, tau)
+        starts[place] = estimated(task, point, course, lead, tau)
     return replace(task, starts=starts)

@@ -6,8 +6,9 @@ nuisance terms) is then solved for by non-negative least squares. Only the rest 
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,13 +22,17 @@ from gms_fsm.identification.problem.runs import (
     LOST,
     ComparedColumn,
     Course,
+    CourseRuns,
     Driver,
-    FinishedRun,
-    with_numbers,
+    ThreadPool,
 )
 from gms_fsm.identification.problem.unknowns import Coordinates, Unknown, values_by_key
+from gms_fsm.lowering.program import arguments
 from gms_fsm.systems.mounted import Mounted
-from gms_fsm.systems.numbers import value_in, varied
+from gms_fsm.systems.numbers import known_in, value_in, varied
+
+# The values at the rows of a course without their linear parts, then one column for each of these.
+Modelled = FloatArray | GMSError
 
 # Terms of the measurement that are no part of the model, with what they are.
 NUISANCE: Mapping[str, str] = {
@@ -36,29 +41,18 @@ NUISANCE: Mapping[str, str] = {
     "inertia": "mass between contact and sensor, times acceleration",
 }
 MASS = "inertia"  # which is not negative, and makes a force
+AT_ONCE = 4_000_000  # numbers in the tables of runs that are made together
 TINY = 1e-9  # of a linear parameter's largest value: what stands for 0 where a rule says > 0
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One proposal, evaluated.
+    """One proposal, evaluated."""
 
-    Parameters
-    ----------
-    u : ndarray
-        Coordinates of what was searched.
-    linear : ndarray
-        What was solved for: the linear parameters, then the nuisance terms.
-    residual : ndarray, shape (rows,)
-        Model minus measurement, at the rows that count, weighted.
-    lost : GMSError or None
-        Why it could not be evaluated.
-    """
-
-    u: FloatArray
-    linear: FloatArray
-    residual: FloatArray
-    lost: GMSError | None = None
+    u: FloatArray  # coordinates of what was searched
+    linear: FloatArray  # what was solved for: the linear parameters, then the nuisance terms
+    residual: FloatArray  # shape (rows,); Model minus measurement, at the rows that count, weighted
+    lost: GMSError | None = None  # Why it could not be evaluated
 
     @property
     def cost(self) -> float:
@@ -68,40 +62,19 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """What is fitted to what.
+    """What is fitted to what."""
 
-    Parameters
-    ----------
-    subject : Mounted
-        The model with its start values.
-    searched, solved : tuple of Unknown
-        The unknowns that are searched, and those that are solved for.
-    names : tuple of str
-        All of them in the order they were asked for.
-    nuisance : tuple of str
-        Keys of `NUISANCE`.
-    courses : tuple of Course
-        The records.
-    driver : Driver
-        Runs them.
-    measured : ComparedColumn
-        What is compared.
-    ran : list of int
-        One number: how many runs were made.
-    weights : tuple of float
-        What a residual of each course counts; empty for 1.
-    """
-
-    subject: Mounted
+    subject: Mounted  # the model with its start values
     searched: tuple[Unknown, ...]
     solved: tuple[Unknown, ...]
-    names: tuple[str, ...]
-    nuisance: tuple[str, ...]
-    courses: tuple[Course, ...]
-    driver: Driver
-    measured: ComparedColumn
-    ran: list[int]
-    weights: tuple[float, ...] = ()
+    names: tuple[str, ...]  # all of them in the order they were asked for
+    nuisance: tuple[str, ...]  # keys of `NUISANCE`
+    courses: tuple[Course, ...]  # the records
+    driver: Driver  # runs them
+    measured: ComparedColumn  # what is compared
+    ran: list[int]  # one number: how many runs were made
+    weights: tuple[float, ...] = ()  # what a residual of each course counts; empty for 1
+    _own: threading.local = field(default_factory=threading.local, init=False, repr=False)
 
     @property
     def order(self) -> tuple[Unknown, ...]:
@@ -121,10 +94,10 @@ class Experiment:
 
     def weighted(self, parts: Sequence[FloatArray], power: float = 1.0) -> FloatArray:
         """Return the values at the rows of all courses, times their weights."""
-        if not self.weights:
-            return np.concatenate(list(parts))
-        every = zip(parts, self.weights, strict=True)
-        return np.concatenate([part * weight**power for part, weight in every])
+        if self.weights:
+            every = zip(parts, self.weights, strict=True)
+            parts = [part * weight**power for part, weight in every]
+        return np.concatenate(list(parts)) if len(parts) > 1 else parts[0]
 
     def unweighted(self, values: FloatArray) -> FloatArray:
         """Return values without their weights."""
@@ -142,57 +115,129 @@ class Experiment:
         known = {
             "offset": np.ones(course.t.size),
             "drift": course.t - course.t[0],
-            "inertia": course.acceleration,
+            "inertia": course.acceleration if MASS in self.nuisance else None,
         }
         columns = [known[name] for name in self.nuisance]
         return np.stack(columns, axis=1) if columns else np.empty((course.t.size, 0))
 
-    def columns(
-        self, subject: Mounted, course: Course
-    ) -> tuple[FinishedRun, FloatArray, FloatArray]:
-        """Run a course; return the force without its linear parts, and one column for each part.
+    def _runs(self, course: Course) -> tuple[CourseRuns, FloatArray]:
+        """Return the runs of a course in this thread, and its nuisance columns."""
+        known: dict[int, Any] = vars(self._own).setdefault("runs", {})
+        if id(course) in known:
+            _, runs, nuisance = known[id(course)]
+            return runs, nuisance
+        start = self.driver.start(self.subject, course)
+        names = [[_called(self.subject, each) for each in u] for u in (self.searched, self.solved)]
+        made = CourseRuns(start, self.measured, *names), self.nuisance_columns(course)
+        if any(course is each for each in self.courses):
+            known[id(course)] = (course, *made)
+        return made
 
-        The columns are differences of the force between two values of a parameter: exact, because
-        the force is linear in it.
-        """
-        self.ran[0] += 1
-        ran = self.driver.run(subject, course)
-        whole = self.measured.values(ran)
-        columns, rest = [], whole.copy()
-        for each in self.solved:
-            present = value_of(subject, each)
-            step = present if present != 0.0 else 1.0
-            moved = varied(subject, values_by_key(subject, [each], [present + step]))
-            program = with_numbers(ran.program, moved, course, self.driver)
-            column = (self.measured.values(ran, program) - whole) / step
-            rest -= present * column
-            columns.append(column)
-        own = np.stack(columns, axis=1) if columns else np.empty((whole.size, 0))
-        return ran, rest, np.concatenate([own, self.nuisance_columns(course)], axis=1)
+    def modelled(self, places: Sequence[FloatArray], course: Course) -> list[Modelled]:
+        """Run a course with each of some proposals; return the error of one that is lost."""
+        self.ran[0] += len(places)
+        try:
+            runs, nuisance = self._runs(course)
+        except LOST as error:
+            return [_as_error(error)] * len(places)
+        found: dict[int, Modelled] = {}
+        numbers = np.full((len(places), len(self.searched)), np.nan)  # which no run takes
+        for i, u in enumerate(places):
+            try:
+                numbers[i] = self.coordinates.numbers(u)
+            except ArithmeticError as error:
+                found[i] = _as_error(error)
+        if runs.known:
+            present = [value_of(self.subject, each) for each in self.solved]
+            which, tables = runs.tables(numbers, nuisance)
+            tables[:, :, 0] -= tables[:, :, 1 : 1 + len(present)] @ np.array(present)
+            found |= dict(zip(which.tolist(), tables, strict=True))
+        return [
+            found[i] if i in found else self._alone(own, course, nuisance)
+            for i, own in enumerate(numbers)
+        ]
+
+    def modelled_once(self, u: FloatArray, course: Course) -> FloatArray:
+        """Run a course with one proposal; a `GMSError` if it is lost."""
+        found = self.modelled([u], course)[0]
+        if isinstance(found, GMSError):
+            raise found
+        return found
+
+    def _alone(self, numbers: FloatArray, course: Course, nuisance: FloatArray) -> Modelled:
+        """Run a course from new, as a simulation does; slopes are differences, as above."""
+        try:
+            subject = self.reference(numbers)
+            trace = self.driver.run(subject, course)
+            whole = self.measured.values(trace)
+            columns, rest = list[FloatArray](), whole.copy()
+            for each in self.solved:
+                present = value_of(subject, each)
+                step = present if present != 0.0 else 1.0
+                moved = varied(subject, values_by_key(subject, [each], [present + step]))
+                p = arguments(self.driver.driven(moved, course).system)
+                program = replace(trace.program, p=p)
+                columns.append((self.measured.values(trace, program) - whole) / step)
+                rest -= present * columns[-1]
+        except LOST as error:
+            return _as_error(error)
+        return np.column_stack([rest, *columns, nuisance])
 
     def reference(self, numbers: FloatArray) -> Mounted:
         """Return the subject with what was searched; linear parameters keep their start values."""
         return varied(self.subject, self.coordinates.values(numbers))
 
     # ------------------------------------------------------------------ evaluation
+    def every(self, places: Sequence[FloatArray], pool: ThreadPool | None = None) -> list[Modelled]:
+        """Return what is modelled with each of some proposals at the rows that count, weighted."""
+        if pool is not None and len(places) > 1:
+            count = -(-len(places) // pool.workers)
+            some = [places[i : i + count] for i in range(0, len(places), count)]
+            return [each for found in pool.map(self.every, some) for each in found]
+        most = max(1, AT_ONCE // (sum(each.t.size for each in self.courses) * (1 + self.terms)))
+        if len(places) > most:
+            return self.every(places[:most]) + self.every(places[most:])
+        lost: dict[int, GMSError] = {}
+        parts: list[list[FloatArray]] = [[] for _ in places]
+        for course in self.courses:
+            left = [i for i in range(len(places)) if i not in lost]
+            whole = bool(course.rows.all())
+            modelled = self.modelled([places[i] for i in left], course) if left else []
+            for i, own in zip(left, modelled, strict=True):
+                if isinstance(own, GMSError):
+                    lost[i] = own
+                else:
+                    parts[i].append(own if whole else own[course.rows])
+        return [lost[i] if i in lost else self.weighted(each) for i, each in enumerate(parts)]
+
+    def forces(
+        self, places: Sequence[FloatArray], linear: FloatArray, pool: ThreadPool | None = None
+    ) -> list[FloatArray | None]:
+        """Return what is modelled with given linear parameters; None where a proposal is lost."""
+        return [
+            None if isinstance(each, GMSError) else each[:, 0] + each[:, 1:] @ linear
+            for each in self.every(places, pool)
+        ]
+
+    def many(self, places: Sequence[FloatArray], pool: ThreadPool | None = None) -> list[Point]:
+        """Evaluate proposals: run all records, and solve for the linear parameters."""
+        return [
+            self._point(u, each) for u, each in zip(places, self.every(places, pool), strict=True)
+        ]
+
     def at(self, u: FloatArray) -> Point:
-        """Evaluate a proposal: run all records, and solve for the linear parameters."""
-        parts, rests = [], []
+        """Evaluate one proposal."""
+        return self.many([u])[0]
+
+    def _point(self, u: FloatArray, found: Modelled) -> Point:
         try:
-            subject = self.reference(self.coordinates.numbers(u))
-            for course in self.courses:
-                _, rest, columns = self.columns(subject, course)
-                parts.append(columns[course.rows])
-                rests.append(rest[course.rows])
-            basis = self.weighted(parts)
-            wanted = self.target - self.weighted(rests)
-            if not (np.isfinite(basis).all() and np.isfinite(wanted).all()):
-                raise ArithmeticError("the force is not finite")
+            if isinstance(found, GMSError):
+                raise found
+            basis, wanted = found[:, 1:], self.target - found[:, 0]
             linear = self._solved(basis, wanted)
         except LOST as error:
-            lost = error if isinstance(error, GMSError) else GMSError(str(error))
             far = np.full(self.target.size, 10.0 * self.typical)
-            return Point(u, np.zeros(self.terms), far, lost)
+            return Point(u, np.zeros(self.terms), far, _as_error(error))
         return Point(u, linear, basis @ linear - wanted)
 
     @property
@@ -221,18 +266,21 @@ class Experiment:
 
         A parameter without a bound is the difference of two that are not negative.
         """
-        if not basis.shape[1]:
+        if not self.terms:  # SciPy's own would write where it must not
+            if not np.isfinite(wanted).all():
+                raise ArithmeticError("the force is not finite")
             return np.empty(0)
-        bounded = np.isfinite(self._least)
-        base = np.where(bounded, self._least, 0.0)
-        scale = np.sqrt(np.einsum("ij,ij->j", basis, basis))
-        scale[scale == 0.0] = 1.0
-        scaled = basis / scale
         # The triangle of a QR decomposition has the same least-squares problem in a few rows.
-        triangle: Any = np.linalg.qr(np.column_stack([scaled, wanted - basis @ base]), mode="r")
-        square, right = triangle[:, :-1], triangle[:, -1]
-        free = np.flatnonzero(~bounded)
-        found, _ = nnls(np.concatenate([square, -square[:, free]], axis=1), right, maxiter=1000)
+        triangle: Any = np.linalg.qr(np.column_stack([basis, wanted]), mode="r")
+        if not np.isfinite(triangle).all():
+            raise ArithmeticError("the force is not finite")
+        square, bounded = triangle[:, :-1], np.isfinite(self._least)
+        base = np.where(bounded, self._least, 0.0)
+        scale = np.sqrt(np.einsum("ij,ij->j", square, square))
+        scale[scale == 0.0] = 1.0
+        scaled, free = square / scale, np.flatnonzero(~bounded)
+        right = triangle[:, -1] - square @ base
+        found, _ = nnls(np.concatenate([scaled, -scaled[:, free]], axis=1), right, maxiter=1000)
         count = basis.shape[1]
         found[free] -= found[count:]
         solved: FloatArray = base + found[:count] / scale
@@ -263,6 +311,16 @@ def value_of(subject: Mounted, unknown: Unknown) -> float:
     if unknown.element is None or value.ndim == 0:
         return float(value.flat[0])
     return float(value[unknown.element])
+
+
+def _called(subject: Mounted, unknown: Unknown) -> str:
+    """Return what a repeated run calls it: a single element has no number of its own."""
+    several = unknown.element is not None and known_in(subject)[unknown.key][1] > 1
+    return unknown.name if several else unknown.key
+
+
+def _as_error(error: Exception) -> GMSError:
+    return error if isinstance(error, GMSError) else GMSError(str(error))
 
 
 def split_unknowns(

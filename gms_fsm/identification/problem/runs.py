@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -24,15 +23,19 @@ from gms_fsm.errors import GMSError, MissingExtraError, ParameterError, RecordEr
 from gms_fsm.foundation.arguments import some_of, unknown
 from gms_fsm.foundation.quantities import per_second
 from gms_fsm.lowering.compiling import check_llvmlite
-from gms_fsm.lowering.program import Program, arguments, same_text
+from gms_fsm.lowering.layout import SystemLayout
+from gms_fsm.lowering.program import Program
 from gms_fsm.records.motion import pieces
 from gms_fsm.records.record import Record
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
+from gms_fsm.run.repeated.block import INITIAL, Place, RepeatedRun, Slope
+from gms_fsm.run.repeated.numbers import RepeatedRuns
 from gms_fsm.run.settings import Settings
 from gms_fsm.run.simulate import Run
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.signals import Corners
+from gms_fsm.systems.system import System
 from gms_fsm.traces.observed import Observed
 from gms_fsm.traces.trace import Trace
 
@@ -43,7 +46,7 @@ AT_REST = 1e-2  # of the highest speed
 NEAR = 0.02  # of the travel: where the motion is back at its start
 STEPS_PER_ROW = 60  # default budget of a run
 FEWEST_STEPS = 200_000
-MOST_KEPT = 32  # runs with their buffers, in each thread
+Names = Sequence[str]
 
 
 def engine() -> str:
@@ -57,27 +60,13 @@ def engine() -> str:
 
 @dataclass(frozen=True)
 class ComparedColumn:
-    """What of a run is compared with which column of the record.
+    """What of a run is compared with which column of the record."""
 
-    Parameters
-    ----------
-    text : str
-        As the user gave it: ``"F"``, ``"gear.F"``, ``"load.x"``.
-    column : str
-        ``"force"``, ``"position"`` or ``"velocity"``.
-    contact : str
-        The contact whose force it is, if it is one.
-    body : str
-        The body whose position or velocity it is, if it is one.
-    unit : str
-        Its unit.
-    """
-
-    text: str
-    column: str
-    contact: str = ""
-    body: str = ""
-    unit: str = ""
+    text: str  # as the user gave it: ``"F"``, ``"gear.F"``, ``"load.x"``
+    column: str  # ``"force"``, ``"position"`` or ``"velocity"``
+    contact: str = ""  # the contact whose force it is, if it is one
+    body: str = ""  # the body whose position or velocity it is, if it is one
+    unit: str = ""  # its unit
 
     @classmethod
     def of(cls, text: Any, subject: Mounted) -> ComparedColumn:
@@ -109,55 +98,39 @@ class ComparedColumn:
         """Unit of the position of what it belongs to."""
         return "rad" if self.unit in ("Nm", "rad", "rad/s") else "m"
 
-    def values(self, ran: FinishedRun, program: Program | None = None) -> FloatArray:
+    def name(self, system: System, layout: SystemLayout) -> str:
+        """Return what the layout calls it."""
+        if self.contact:
+            return layout.contact(self.contact).of("F")
+        body = system.body(self.body)
+        return body.x if self.column == "position" else body.v
+
+    def values(self, trace: Trace, program: Program | None = None) -> FloatArray:
         """Return its values at the rows of a run, with the numbers of a program."""
-        program = ran.program if program is None else program
+        program = trace.program if program is None else program
         if self.body:
             return np.asarray(
-                getattr(ran.trace.body(self.body), {"position": "x"}.get(self.column, "v"))
+                getattr(trace.body(self.body), {"position": "x"}.get(self.column, "v"))
             )
-        seen = Observed(program, ran.trace.rows, compiled=engine() == "compiled")
+        seen = Observed(program, trace.rows, compiled=engine() == "compiled")
         return seen[program.layout.contact(self.contact).of("F")]
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What one record makes a model do.
+    """What one record makes a model do."""
 
-    Parameters
-    ----------
-    record : Record
-        The record.
-    t, v, x : ndarray, shape (rows,)
-        The motion at its rows: s, m/s, m.
-    measured : ndarray, shape (rows,)
-        What the model is compared with.
-    rows : ndarray of bool, shape (rows,)
-        The rows that count.
-    lead : tuple of ndarray
-        Times and velocities before the first row: the run-in; empty without one.
-    budget : int
-        Steps a run may take.
-    inputs : mapping of str to tuple of ndarray
-        What the record gives to inputs of the chart, in the run-in and at the rows.
-    initial : mapping
-        The initial state; empty for that of the chart.
-    known : bool
-        Whether the state at the first row is known: the motion begins there, at rest, or a run-in
-        leads to it, or it was asked for.
-    """
-
-    record: Record
-    t: FloatArray
-    v: FloatArray
-    x: FloatArray
-    measured: FloatArray
-    rows: NDArray[np.bool_]
-    lead: tuple[FloatArray, FloatArray]
-    budget: int
+    record: Record  # the record
+    t: FloatArray  # shape (rows,); The motion at its rows: s, m/s, m
+    v: FloatArray  # shape (rows,); The motion at its rows: s, m/s, m
+    x: FloatArray  # shape (rows,); The motion at its rows: s, m/s, m
+    measured: FloatArray  # shape (rows,); What the model is compared with
+    rows: NDArray[np.bool_]  # shape (rows,); The rows that count
+    lead: tuple[FloatArray, FloatArray]  # times and velocities before the first row
+    budget: int  # steps a run may take
     inputs: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
-    initial: Mapping[str, Any] = field(default_factory=dict)
-    known: bool = True
+    initial: Mapping[str, Any] = field(default_factory=dict)  # the initial state
+    known: bool = True  # whether the state at the first row is known
 
     @cached_property
     def signal(self) -> Corners:
@@ -296,73 +269,20 @@ def _run_in(t: FloatArray, x: FloatArray, v: FloatArray) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class FinishedRun:
-    """A run that reached its end.
-
-    Parameters
-    ----------
-    program : Program
-        With the numbers of the run.
-    trace : Trace
-        Its rows are those of the course.
-    """
-
-    program: Program
-    trace: Trace
-
-
-@dataclass(eq=False)
-class _Kept:
-    """The compiled run of a course in one thread, to be used again."""
-
-    course: Course
-    run: CompiledRun
-
-
-@dataclass(frozen=True, eq=False)
 class Driver:
-    """Runs a subject along courses.
+    """Runs a subject along courses."""
 
-    Parameters
-    ----------
-    drive : str
-        The signal of a system that the record's velocity replaces; empty for a model, and for a
-        system that moves by itself.
-    rtol : float
-        Relative tolerance.
-    budgets : int
-        How many budgets of its course a run may take.
-    """
+    drive: str  # the signal of a system that the record's velocity replaces
+    rtol: float  # relative tolerance
+    budgets: int  # how many budgets of its course a run may take
 
-    drive: str
-    rtol: float
-    budgets: int
-    _own: threading.local = field(default_factory=threading.local, repr=False)
-
-    def run(self, subject: Mounted, course: Course) -> FinishedRun:
+    def run(self, subject: Mounted, course: Course) -> Trace:
         """Run; a `GMSError` if the numbers break a rule or the run fails."""
-        kept, what = self._runs.get(id(course)), self.driven(subject, course)
-        if kept is not None and same_text(kept.run.start.system, what.system):
-            kept.run.reset(what)
-            run: Run | CompiledRun = kept.run
-        else:
-            start = self.start(subject, course)
-            if start.chosen.engine == "compiled":
-                run = CompiledRun(start)
-                while len(self._runs) >= MOST_KEPT:  # the oldest goes first
-                    del self._runs[next(iter(self._runs))]
-                self._runs[id(course)] = _Kept(course, run)
-            else:
-                run = Run(start)
+        start = self.start(subject, course)
+        run = CompiledRun(start) if start.chosen.engine == "compiled" else Run(start)
         while run.advance():
             pass
-        trace = run.recorder.trace()
-        return FinishedRun(run.recorder.start.program, trace)
-
-    @property
-    def _runs(self) -> dict[int, _Kept]:
-        runs: dict[int, _Kept] = vars(self._own).setdefault("runs", {})
-        return runs
+        return run.recorder.trace()
 
     def driven(self, subject: Mounted, course: Course) -> Mounted:
         """Return a subject that the motion of a course drives."""
@@ -407,9 +327,67 @@ def driver_of(subject: Mounted, drive: str | None, rtol: float, budgets: int) ->
     )
 
 
-def with_numbers(program: Program, subject: Mounted, course: Course, driver: Driver) -> Program:
-    """Return a program with the numbers of a subject in place of its own."""
-    return replace(program, p=arguments(driver.driven(subject, course).system))
+class CourseRuns:
+    """A course under many numbers, all in one call of machine code; of one thread.
+
+    `known` says whether it can be: else each run is made alone, from new.
+    """
+
+    def __init__(
+        self, start: Problem, compared: ComparedColumn, searched: Names, solved: Names
+    ) -> None:
+        self.runs, layout = RepeatedRuns(start), start.program.layout
+        name, known = compared.name(start.system, layout), self.runs.known or {}
+        placed = name in layout.y.shared or name in layout.observed.shared
+        self.known = placed and bool(known) and {*known} >= {*searched, *solved}
+        if not self.known:
+            return
+        self.run = RepeatedRun(start)
+        self.known = self.run.columns.block.is_whole
+        self.searched, self.kept = searched, layout.place(name)
+        own = compared.contact and not start.system.contact(compared.contact).chart.totals
+        parts = layout.contact(compared.contact).of("F_elements") if own else ""
+        groups: dict[object, list[Slope]] = {}
+        for i, name in enumerate(solved, 1):
+            number = known[name]
+            row, shared, element = number.place
+            places = [number.place._replace(element=k) for k in range(number.n)] or [number.place]
+            # Elements that only share a sum are moved together, and each part says its own slope.
+            alone = not parts or element is None
+            kept = self.kept if alone else layout.place(parts, element)
+            groups.setdefault(name if alone else (row, shared), []).append(Slope(i, places, kept))
+        self.slopes = [*groups.values()]
+
+    def tables(self, numbers: FloatArray, others: FloatArray) -> tuple[NDArray[Any], FloatArray]:
+        """Return which runs reached their end; for each the values at the rows, slopes, and others.
+
+        Those left out have numbers that need a look, or have failed.
+        """
+        which: NDArray[np.intp] = np.arange(len(numbers))
+        places: list[Place] = []
+        values = numbers
+        if self.searched:
+            cells = self.runs.cells(dict(zip(self.searched, numbers.T, strict=True)))
+            if cells is None:
+                return which[:0], np.empty((0, 0, 1))
+            which, places = np.flatnonzero(cells.certain), cells.places
+            values = np.ascontiguousarray(cells.values[which])
+        return self._made(which, places, values, others)
+
+    def from_states(
+        self, names: Names, states: FloatArray, others: FloatArray
+    ) -> tuple[NDArray[Any], FloatArray]:
+        """Return the same from initial states, which the start has given; numbers stay."""
+        y = self.runs.start.program.layout.y
+        rows = [row for name in names for row in y.all_of(name)]
+        places = [Place(row, own=False, element=INITIAL) for row in rows]
+        return self._made(np.arange(len(states)), places, np.ascontiguousarray(states), others)
+
+    def _made(
+        self, which: NDArray[Any], places: Sequence[Place], values: FloatArray, others: FloatArray
+    ) -> tuple[NDArray[Any], FloatArray]:
+        done, table = self.run.rows(places, values, self.kept, self.slopes, others)
+        return which[done], table[done]
 
 
 # --------------------------------------------------------------------------- side by side
@@ -418,16 +396,11 @@ Result = TypeVar("Result")
 
 
 class ThreadPool:
-    """Calls side by side in threads; results come in order, whatever ends first.
-
-    Parameters
-    ----------
-    workers : int, optional
-        Number of threads; one per core by default.
-    """
+    """Calls side by side in threads; results come in order, whatever ends first."""
 
     def __init__(self, workers: int | None = None) -> None:
-        self._threads = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+        self.workers = workers or os.cpu_count() or 1
+        self._threads = ThreadPoolExecutor(self.workers)
         self._limits: contextlib.AbstractContextManager[object] = contextlib.nullcontext()
 
     def __enter__(self) -> ThreadPool:

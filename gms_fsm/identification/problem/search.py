@@ -2,23 +2,22 @@
 
 *hops*: a spread of starts, then perturb the best, refine, keep the better one. The cost jumps where
 a break-away near a reversal appears, so that one local search often stays in the wrong place.
-*local* refines the start only; *de* is differential evolution, the slow alternative.
+*local* refines the start only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.optimize import Bounds, differential_evolution, least_squares
+from scipy.optimize import least_squares
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.identification.problem.experiment import Experiment, Point
 from gms_fsm.identification.problem.runs import ThreadPool
 
-SEARCHES = ("hops", "local", "de")
+SEARCHES = ("hops", "local")
 SPREAD = 16  # proposals about the start
 FURTHER = 0.7  # their distance from it, in coordinates (0.7 is a factor of 2)
 SEEDS = 4  # the best of them that are refined
@@ -31,13 +30,7 @@ MOST_EVALUATIONS = 15  # of one refinement, without those of its slopes
 
 @dataclass(eq=False)
 class Best:
-    """The best point so far; kept when the search is interrupted.
-
-    Parameters
-    ----------
-    told : callable
-        Called after each part of the search with the share that is done.
-    """
+    """The best point so far; kept when the search is interrupted."""
 
     told: Callable[[float], object] = float  # which does nothing else
     point: Point | None = None
@@ -80,11 +73,7 @@ def refine(
         places = [
             place + step * sign * unit for sign, unit in zip(signs, np.eye(place.size), strict=True)
         ]
-        there = (
-            [experiment.at(each) for each in places]
-            if pool is None
-            else pool.map(experiment.at, places)
-        )
+        there = experiment.many(places, pool)
         found = np.empty((here.residual.size, place.size))
         for i, (point, sign) in enumerate(zip(there, signs, strict=True)):
             gone = point.lost is not None
@@ -129,7 +118,7 @@ def hops(
         return
     if spread:
         drawn = start + FURTHER * rng.standard_normal((spread, start.size))
-        about = pool.map(experiment.at, [np.clip(each, low, high) for each in drawn])
+        about = experiment.many(list(np.clip(drawn, low, high)), pool)
         best.take(about)
         found = sorted((each for each in about if each.lost is None), key=lambda each: each.cost)
         best.told(1 / parts)
@@ -149,29 +138,3 @@ def hops(
             )
         )
         best.told((2 + done // AT_ONCE + 1) / parts)
-
-
-def de(experiment: Experiment, seed: int, best: Best, pool: ThreadPool) -> None:
-    """Search by differential evolution."""
-    low, high = experiment.coordinates.limits
-    best.take([experiment.start_point()])
-    if not len(low):
-        return
-
-    def costs(many: Any, /) -> Any:
-        points = pool.map(experiment.at, list(np.atleast_2d(many.T)))
-        best.take(points)
-        return np.array([each.cost for each in points])
-
-    differential_evolution(
-        costs,
-        Bounds(low, high),
-        popsize=6,
-        maxiter=45,
-        tol=1e-3,
-        init="sobol",
-        polish=False,
-        vectorized=True,
-        updating="deferred",
-        seed=seed,
-    )

@@ -23,7 +23,7 @@ from gms_fsm.identification.problem.runs import (
     courses_of,
     driver_of,
 )
-from gms_fsm.identification.problem.search import Best, de, hops, refine
+from gms_fsm.identification.problem.search import Best, hops, refine
 from gms_fsm.identification.problem.unknowns import Unknown, unknowns_of, values_by_key
 from gms_fsm.records.record import Record
 from gms_fsm.systems.mounted import Mounted
@@ -66,30 +66,14 @@ class FitOptions:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A model, records and options: everything that a fit depends on.
+    """A model, records and options: everything that a fit depends on."""
 
-    Parameters
-    ----------
-    subject : Mounted
-        With the start values.
-    records : tuple of Record
-        The records.
-    options : FitOptions
-        The arguments.
-    begin : str
-        What is before the first row of a record.
-    starts : mapping of tuple of int to mapping
-        Initial states that were estimated, by the numbers of record and stretch.
-    ran : list of int
-        One number: how many runs were made.
-    """
-
-    subject: Mounted
-    records: tuple[Record, ...]
-    options: FitOptions
-    begin: str = MOVING
+    subject: Mounted  # with the start values
+    records: tuple[Record, ...]  # the records
+    options: FitOptions  # the arguments
+    begin: str = MOVING  # what is before the first row of a record
     starts: Mapping[Place, Mapping[str, FloatArray]] = field(default_factory=dict)
-    ran: list[int] = field(default_factory=lambda: [0])
+    ran: list[int] = field(default_factory=lambda: [0])  # one number: how many runs were made
 
     @cached_property
     def measured(self) -> ComparedColumn:
@@ -218,7 +202,7 @@ class Task:
     def coarse_search(self, best: Best, pool: ThreadPool) -> Task:
         """Search on few rows; return the task with the beginning that suits the data."""
         given = self.options
-        {"hops": hops, "de": de, "local": _local}[given.search](self.coarse, given.seed, best, pool)
+        (_local if given.search == "local" else hops)(self.coarse, given.seed, best, pool)
         return self.settled(best)
 
     def settled(self, best: Best) -> Task:
@@ -290,9 +274,8 @@ def stretches(courses: Sequence[Course], residual: FloatArray) -> list[FloatArra
 
 def at_course(experiment: Experiment, point: Point, course: Course) -> FloatArray:
     """Return the modelled values at the rows of a course, nuisance terms included."""
-    subject = experiment.reference(experiment.coordinates.numbers(point.u))
-    _, rest, columns = experiment.columns(subject, course)
-    found: FloatArray = rest + columns @ point.linear
+    modelled = experiment.modelled_once(point.u, course)
+    found: FloatArray = modelled[:, 0] + modelled[:, 1:] @ point.linear
     return found
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,49 +27,31 @@ LINEAR_SPAN = 100.0  # times the start
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number to be found.
+    """A number to be found."""
 
-    Parameters
-    ----------
-    name : str
-        As in tables: ``k1``, ``F_c``, ``gear.k2``.
-    key : str
-        The parameter's name in the model: ``k``.
-    element : int or None
-        Counted from 0; None for a number that all elements share.
-    parameter : Parameter
-        Unit, rule and meaning.
-    start : float
-        The value at which a search starts.
-    low, high : float
-        Bounds of the search.
-    other : str
-        The parameter that is its lower bound, if any.
-    """
+    name: str  # as in tables: ``k1``, ``F_c``, ``gear.k2``
+    key: str  # the parameter's name in the model: ``k``
+    element: int | None  # counted from 0; None for a number that all elements share
+    parameter: Parameter  # unit, rule and meaning
+    start: float  # the value at which a search starts
+    low: float = -math.inf  # bounds of the search
+    high: float = math.inf  # bounds of the search
+    other: str = ""  # the parameter that is its lower bound, if any
 
-    name: str
-    key: str
-    element: int | None
-    parameter: Parameter
-    start: float
-    low: float = -math.inf
-    high: float = math.inf
-    other: str = ""
-
-    @property
+    @cached_property
     def positive(self) -> bool:
         """Whether its rule and its start make it positive."""
         limits = [b.limit for b in self.parameter.bounds if b.op in (">", ">=")]
         return self.start > 0.0 and any(not isinstance(x, str) and x >= 0.0 for x in limits)
 
-    @property
+    @cached_property
     def kind(self) -> str:
         """How it is searched: ``"excess"``, ``"log"`` or ``"linear"``."""
         if self.other:
             return "excess"
         return "log" if self.positive else "linear"
 
-    @property
+    @cached_property
     def least(self) -> float:
         """The smallest value its rule allows, -inf if there is none."""
         limits = [b.limit for b in self.parameter.bounds if b.op in (">", ">=")]
@@ -181,18 +164,10 @@ def _bounded(unknown: Unknown, pair: Any, base: float) -> Unknown:
 # --------------------------------------------------------------------------- coordinates
 @dataclass(frozen=True, eq=False)
 class Coordinates:
-    """The map between the numbers and the coordinates u in which they are searched.
+    """The map between the numbers and the coordinates u in which they are searched."""
 
-    Parameters
-    ----------
-    subject : Mounted
-        Supplies all numbers that are not searched.
-    unknowns : tuple of Unknown
-        What is searched.
-    """
-
-    subject: Mounted
-    unknowns: tuple[Unknown, ...]
+    subject: Mounted  # supplies all numbers that are not searched
+    unknowns: tuple[Unknown, ...]  # what is searched
 
     @property
     def start(self) -> FloatArray:

@@ -39,6 +39,11 @@ def following_of(start: Problem) -> Following:
         end=column("f", width),
         mode=column("i", layout.modes),
         counts=column("i", 2),
+        kept=column("i"),
+        cells=column("i", 3),
+        passes=column("i"),
+        steps=column(),
+        table=column(table=True),
     )
     return Following(adapting_of(start), repeats)
 

@@ -18,13 +18,23 @@ from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows
 from integrators import loop
 
+INITIAL = -2  # as machine code knows it
+
 
 class Place(NamedTuple):
     """Where a number is: alone, or a row of one for each element, or one of these."""
 
     row: int
     own: bool  # of the elements
-    element: Any = None  # an index; None for all elements
+    element: Any = None  # an index; None for all elements; `INITIAL` for a row of the state
+
+
+class Slope(NamedTuple):
+    """By what number something is differentiated."""
+
+    number: int  # of the slope, from 1
+    places: Sequence[Place]  # one, or those of several elements, which are equal
+    kept: int  # the place of what says it: the value itself, or the part that is of one element
 
 
 class Ends(NamedTuple):
@@ -40,15 +50,7 @@ STEPS = 100_000  # of one run between two others
 
 
 class RepeatedRun:
-    """A run whose columns, machine code and plan serve again and again, in one thread at a time.
-
-    Parameters
-    ----------
-    start : Problem
-        For the engine ``"compiled"``; no signal of it is a Python function.
-    tables : CountTables, optional
-        Where rows are counted, to begin with.
-    """
+    """A run whose columns, machine code and plan serve again and again, in one thread at a time."""
 
     def __init__(self, start: Problem, tables: CountTables | None = None) -> None:
         self.columns = columns = Columns(start, tables=tables)
@@ -120,31 +122,8 @@ class RepeatedRun:
         """Make one run after the other, each with a row of values; output must be ``"end"``."""
         columns: Any = self.columns
         columns.tables = tables
-        program, runs = columns.start.program, len(values)
-        width = 1 + program.layout.y.size + program.layout.observed.size
-        rows, elements = ([getattr(u, name) for u in places] for name in ("row", "element"))
-        found = Ends(
-            np.empty((runs, width)),
-            np.empty((runs, program.layout.modes), dtype=np.int64),
-            np.empty((runs, 2), dtype=np.int64),
-            (),
-        )
-        more = columns.run_of.more
-        repeats = more.repeats._replace(
-            words=columns.block.words,
-            floats=self.floats,
-            first=self.first[0],
-            rows=np.array(rows, dtype=np.int64),
-            columns=np.array([-1 if u is None else u for u in elements], dtype=np.int64),
-            values=values,
-            end=found.end,
-            mode=found.mode,
-            counts=found.counts,
-        )
-        columns.run_of = columns.run_of._replace(more=more._replace(repeats=repeats))
-        self._write()
-        columns.block.restore(self.first)
-        made, counted = 0, tables and tables.copy()
+        found = self._repeating(places, values)
+        made, counted, runs = 0, tables and tables.copy(), len(values)
         while (made := self._repeat(columns.block.address, made, runs, STEPS)) < runs:
             fired = columns.log.firings
             columns.make_room_for_firings()
@@ -156,6 +135,78 @@ class RepeatedRun:
         log, count = columns.log, columns.log.firings
         switches = log.t[:count], log.machine[:count], log.edge[:count], log.numbers[:count]
         return found._replace(log=tuple(each.copy() for each in switches))
+
+    def rows(
+        self,
+        places: Sequence[Place],
+        values: NDArray[np.float64],
+        kept: int,
+        slopes: Sequence[Sequence[Slope]],
+        others: NDArray[np.float64],
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+        """Return which runs reached their end, and for each row one value, its slopes, and others.
+
+        `kept` counts the state, then what is observed. Numbers that the value is linear in are
+        moved together, group by group. Output must be ``"t_eval"``, of which no stops stay.
+        """
+        log: Any = self.columns.log
+        log.stops_t = np.empty(0)
+        rows, every = len(others), [each for group in slopes for each in group]
+        first = 1 + len(every)
+        table = np.empty((len(values), rows, first + others.shape[1]))
+        table[:, :, first:] = others
+        cells, passes = list[tuple[int, int, int]](), [0]
+        for group in slopes:
+            for each in group:
+                says = [each.number, *[0] * (len(each.places) - 1)]
+                parts = zip(each.places, says, strict=True)
+                cells += [(place.row, _column(place.element), j) for place, j in parts]
+            passes.append(len(cells))
+        said = {each.number: each.kept for each in every}
+        more = {
+            "kept": np.array([kept, *(said[j] for j in sorted(said))]),
+            "cells": np.array(cells, dtype=np.int64).reshape(-1, 3),
+            "passes": np.array(passes),
+            "steps": np.empty(len(cells)),
+            "table": table.reshape(-1, table.shape[2]),
+        }
+        found = self._repeating(places, values, **more)
+        most = self.columns.start.options.max_steps + 1
+        made, runs = 0, len(values)
+        while (made := self._repeat(self.columns.block.address, made, runs, most)) < runs:
+            self.columns.make_room_for_firings()
+            self._write()
+            log.firings = 0
+        return found.counts[:, 0] == loop.DONE, table
+
+    def _repeating(self, places: Sequence[Place], values: NDArray[np.float64], **kept: Any) -> Ends:
+        """Say what is repeated with which numbers, and return what its results are put into."""
+        columns: Any = self.columns
+        program, runs = columns.start.program, len(values)
+        width = 1 + program.layout.y.size + program.layout.observed.size
+        found = Ends(
+            np.empty((runs, width)),
+            np.empty((runs, program.layout.modes), dtype=np.int64),
+            np.empty((runs, 2), dtype=np.int64),
+            (),
+        )
+        more = columns.run_of.more
+        repeats = more.repeats._replace(
+            words=columns.block.words,
+            floats=self.floats,
+            first=self.first[0],
+            rows=np.array([each.row for each in places], dtype=np.int64),
+            columns=np.array([_column(each.element) for each in places], dtype=np.int64),
+            values=values,
+            end=found.end,
+            mode=found.mode,
+            counts=found.counts,
+            **kept,
+        )
+        columns.run_of = columns.run_of._replace(more=more._replace(repeats=repeats))
+        self._write()
+        columns.block.restore(self.first)
+        return found
 
     def _make_room(self) -> None:
         """Double the columns that are full; from now on they are as long from the start."""
@@ -197,3 +248,8 @@ class RepeatedRun:
             return rows, rows, columns.start.fired(*copies)
 
         return made
+
+
+def _column(element: Any) -> int:
+    """Return where machine code finds a number: that of an element, or -1."""
+    return -1 if element is None else int(element)
