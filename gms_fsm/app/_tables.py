@@ -283,7 +283,7 @@ class FitTable(Table):
     train: _Pair | None = Field(None, description="rows to fit, from and to, s; all by default")
     test: _Pair | None = Field(None, description="rows to hold out, from and to, s")
     cycles: float | None = Field(None, gt=0, description="period of the record, s")
-    search: Literal["hops", "local", "de"] = "hops"
+    search: Literal["hops", "local"] = "hops"
     bounds: dict[str, _Pair] = Field({}, description="lowest and highest value, by parameter")
     seed: int = Field(0, ge=0)
     most_steps: int | None = Field(None, ge=1, description="of the integrator, for each trial run")

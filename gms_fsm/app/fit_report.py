@@ -229,7 +229,7 @@ def _as_good(profiles: Sequence[Profile]) -> list[str]:
     if lowest < -LIMIT:
         lines.append(
             f"- a better fit was met on the way (rise {lowest:.3g}): the search had not found the "
-            'best; search again, for example with search = "de" or another seed'
+            "best; search again, for example with another seed"
         )
     return lines
 
