@@ -43,7 +43,11 @@ class RunData {
 
   // Rows with their states and firings, in the place of those before; what reads them stays.
   take({ contacts, ...rows }) {
-    Object.assign(this, rows);
+    Object.assign(this, rows, { times: new Float64Array(rows.rows), order: new Uint16Array(rows.rows) });
+    for (let row = 0; row < this.rows; row++) {
+      this.times[row] = this.t(row);
+      if (row && this.times[row] === this.times[row - 1]) this.order[row] = this.order[row - 1] + 1; // in its instant
+    }
     contacts.forEach((each, k) => this.contacts[k].take(each));
     this.fired = new Map(); // by row: the firing that made it
     this.late = new Map(); // by row: firings between requested times, which have no row of their own
@@ -202,24 +206,19 @@ class Contact {
 // are shown next to micro-steps.
 class Frames {
   constructor(runs) {
-    const own = runs.map((run) => {
-      const times = Float64Array.from({ length: run.rows }, (_, row) => run.t(row)), order = new Uint16Array(run.rows);
-      for (let row = 1; row < run.rows; row++) order[row] = times[row] === times[row - 1] ? order[row - 1] + 1 : 0;
-      return { times, order };
-    });
     const most = runs.reduce((sum, { rows }) => sum + rows, 0), t = new Float64Array(most), rows = runs.map(() => new Uint32Array(most));
     const at = runs.map(() => 0);
     let count = 0;
     for (; ; count++) {
       let least = Infinity, order = 0;
-      for (let k = 0; k < own.length; k++) {
-        const i = at[k], { times, order: orders } = own[k];
+      for (let k = 0; k < runs.length; k++) {
+        const i = at[k], { times, order: orders } = runs[k];
         if (i < times.length && (times[i] < least || (times[i] === least && orders[i] < order))) [least, order] = [times[i], orders[i]];
       }
       if (least === Infinity) break;
       t[count] = least;
-      for (let k = 0; k < own.length; k++) {
-        if (own[k].times[at[k]] === least && own[k].order[at[k]] === order) at[k] += 1;
+      for (let k = 0; k < runs.length; k++) {
+        if (runs[k].times[at[k]] === least && runs[k].order[at[k]] === order) at[k] += 1;
         rows[k][count] = Math.max(at[k] - 1, 0);
       }
     }

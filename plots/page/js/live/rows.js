@@ -48,7 +48,8 @@ class LiveRun extends RunData {
   }
 
   rowsOf(found) {
-    const { sizes, banks } = this.engine.known, numbers = this.contacts.map(({ edgeNumbers }) => edgeNumbers), { count, mode } = found, same = Uint32Array.from({ length: count }, (_, row) => row);
+    const { sizes, banks } = this.engine.known, numbers = this.contacts.map(({ edgeNumbers }) => edgeNumbers), { count, mode } = found, same = new Uint32Array(count);
+    for (let row = 0; row < count; row++) same[row] = row;
     Object.assign(this, { found, width: sizes, rows: count });
     const steps = this.made(found), contacts = banks.map(([first, edges, n], bank) => {
       const rows = [], elements = [], modes = [];
