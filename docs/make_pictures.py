@@ -365,15 +365,15 @@ def mujoco_figure() -> Figure:
         left, right = figure.subplots(1, 2)
         looks = (":", "--", "-")
         for (amplitude, (M, q)), look in zip(names["loops"].items(), looks, strict=True):
-            left.plot(1e3 * q, M, look, color=INK, label=f"{amplitude} N·m")
+            left.plot(1e3 * q, M, look, color=INK, label=f"{amplitude} Nm")
         left.set(
-            xlabel="angle [mrad]", ylabel="torque [N·m]", title="Loops below break-away, 1.5 N·m"
+            xlabel="angle [mrad]", ylabel="torque [Nm]", title="Loops below break-away, 1.5 Nm"
         )
         left.legend(loc="upper left", title="amplitude", title_fontsize=8)
         t = 1e-3 * np.arange(1, len(names["held"]) + 1)
         right.plot(t, 1e3 * names["native"], "--", color=TEXT_GREY, label="frictionloss of MuJoCo")
         right.plot(t, 1e3 * names["held"], color=INK, label="four elements")
-        right.set(xlabel="$t$ [s]", ylabel="angle [mrad]", title="Angle under a constant 1 N·m")
+        right.set(xlabel="$t$ [s]", ylabel="angle [mrad]", title="Angle under a constant 1 Nm")
         right.set_xlim(0, t[-1])
         right.legend(loc="upper left")
     return figure

@@ -51,7 +51,7 @@ GROWING = "5e-6 * t * cos(2 * t)"  # m/s
 LOOPS = ("bouc-wen", "dahl")  # models of pre-sliding: strokes that grow, and F over x
 WINDOWS = {  # s, shown of a run, and why
     "seven-parameter": (
-        (6.5, 10.2),
+        (7.0, 10.14),
         "Shown is the first slip: later the mass vibrates on its spring `k_t`, at about 50 Hz.",
     )
 }

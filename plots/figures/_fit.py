@@ -226,7 +226,7 @@ def _sheet(parameters: int) -> tuple[Figure, Sequence[Axes], Axes | None]:
     grid = figure.add_gridspec(len(tall), len(wide), height_ratios=tall, width_ratios=wide)
     places = [(row, column) for column in range(len(wide)) for row in range(4 // len(wide))]
     axes = [figure.add_subplot(grid[place]) for place in places]
-    return figure, axes, figure.add_subplot(grid[-1, 0]) if below else None
+    return figure, axes, figure.add_subplot(grid[-1, :]) if below else None
 
 
 def _over_time(ax: Axes, part: _Compared, shown: Window, test: Window | None) -> None:
@@ -333,7 +333,6 @@ def _parameters(ax: Axes, table: Sequence[Estimate], measured: tuple[str, Scale]
     if not narrow():
         scales = _scales(table, measured)
         values = ax.secondary_yaxis("right")
-        values.set_in_layout(False)  # there is nothing to the right of it
         values.set_yticks(rows, [_value(each, scales[each.unit]) for each in table])
         values.tick_params(axis="y", length=0, labelsize=font(8.5))
         values.spines["right"].set_visible(False)

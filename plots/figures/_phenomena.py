@@ -25,7 +25,7 @@ from plots.style.presets import font, inches, pt, room, settings, to_scale
 COLUMNS, PANEL, NARROWEST = 3, (2.7, 2.15), 1.9  # in
 LETTERS = 12.5  # per inch, of the text under the panels
 WORDS = 14  # letters of a heading, in a line
-CELL, NAME = 1.06, 0.087  # in: width of a cell, of a letter of a model's name
+CELL, NAME = 0.98, 0.087  # in: width of a cell, of a letter of a model's name
 TOO_LARGE = 4.0  # times the median range: such a panel has its own axis
 # Verdicts differ by shape; the grounds only help to find them.
 TINTS = {"shows": "chosen", "shows wrongly": "pale"}
@@ -127,6 +127,9 @@ def _panel(
         ax.locator_params(axis="x", nbins=4)
     ax.locator_params(axis="y", nbins=4)
     ax.tick_params(labelsize=font(7.5), length=2.5)
+    ax.grid(color=colour("pale"), linewidth=pt(0.5))  # most panels have no numbers of their own
+    if found.verdict == "shows wrongly":
+        ax.set_facecolor(colour("chosen"))
     ax.set_title(model, fontsize=font(9), fontweight="bold", pad=inches(15))
     brief = f"{MARKS[found.verdict]} {phenomenon.brief(found)}" + (", own scale" if own else "")
     look = {"xycoords": "axes fraction", "ha": "left", "va": "baseline", "family": "DejaVu Sans"}
@@ -219,13 +222,13 @@ def phenomena_matrix(
                 ax.add_patch(
                     Rectangle(corner, wide, high, facecolor=tint, edgecolor=PALE_GREY, lw=pt(0.6))
                 )
-                _symbol(ax, corner[0] + (0.5 * wide if brief else 0.2), y, found.verdict)
+                _symbol(ax, corner[0] + (0.5 * wide if brief else 0.16), y, found.verdict)
                 if not brief:
-                    look: Any = {"va": "center", "fontsize": font(9.5), "linespacing": 0.95}
+                    look: Any = {"va": "center", "fontsize": font(9.5), "linespacing": 1.05}
                     text = phenomenon.brief(found)
                     if found.instead:
                         text, look["fontsize"] = text.replace(" ", "\n", 1), font(8.5)
-                    ax.text(corner[0] + 0.33, y, text, **look)
+                    ax.text(corner[0] + 0.28, y, text, **look)
         for column, note in enumerate(under_heads):
             x, side = (
                 (left - 0.1, "right") if column == 0 else (left + (column - 0.5) * wide, "center")

@@ -27,7 +27,7 @@ from plots.style.presets import inches, room, settings, to_scale
 
 COLUMN, NARROWEST, WIDEST, SIDES = 1.15, 6.4, 11.6, 1.0  # inches: a column, the figure, margins
 FORCE, ROW, FLATTEST = 2.3, 0.34, 0.22  # inches: the upper panel, a row of the lower one
-TOP, BELOW = 0.82, 1.25  # inches: above and below the panels
+TOP, BELOW = 0.82, 1.0  # inches: above and below the panels
 FIRED = "has fired"
 HEAD = 0.55  # inches: the title alone
 

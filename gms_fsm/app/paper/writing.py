@@ -218,19 +218,17 @@ def _listing(trace: Trace) -> Figure:
 
     functions = lower(trace.model, trace.rig).source.split("\n\n\n")
     texts = [next(each for each in functions if f"def {name}(" in each) for name in USED]
-    wide = [max(map(len, text.splitlines())) + 6 for text in texts]
-    tall = max(len(text.splitlines()) for text in texts) + 4
-    size = 7.0  # points
-    figure = Figure(figsize=(width("m", size) / 72 * sum(wide), LINE * size / 72 * tall))
+    lines = "\n\n".join(texts).splitlines()
+    tall, size = len(lines) + 3, 7.0  # lines, points
+    across = width("m", size) / 72 * (max(map(len, lines)) + 3)
+    figure = Figure(figsize=(across, LINE * size / 72 * tall))
     figure.suptitle(LISTED, x=0.01, y=1 - 0.6 / tall, ha="left", size=9.0, color=INK)
     look: dict[str, Any] = {"size": size, "family": "monospace", "va": "baseline"}
-    for text, x in zip(texts, (0.01, 0.01 + wide[0] / sum(wide)), strict=True):
-        code = [each.partition("#")[0] for each in text.splitlines()]
-        # Line by line: in one text the letters of a line would decide its height.
-        for number, (line, whole) in enumerate(zip(code, text.splitlines(), strict=True)):
-            comment = " " * len(line) + whole[len(line) :]
-            for part, ink in ((line, INK), (comment, TEXT_GREY)):
-                figure.text(x, 1 - (3 + number) / tall, part, color=ink, **look)
+    # Line by line: in one text the letters of a line would decide its height.
+    for number, whole in enumerate(lines):
+        code = whole.partition("#")[0]
+        for part, ink in ((code, INK), (" " * len(code) + whole[len(code) :], TEXT_GREY)):
+            figure.text(0.01, 1 - (3 + number) / tall, part, color=ink, **look)
     return figure
 
 

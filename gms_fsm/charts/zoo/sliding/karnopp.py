@@ -58,6 +58,13 @@ KARNOPP = Chart(
         Transition("reverse_backward", "backward", "forward", guard="v >= D"),
     ),
     reference="Karnopp (1985)",
+    layout={
+        "stuck": (250, 0),
+        "start_backward": (0, 170),
+        "start_forward": (500, 170),
+        "backward": (100, 340),
+        "forward": (400, 340),
+    },
 )
 CHARTS = (
     Entry(

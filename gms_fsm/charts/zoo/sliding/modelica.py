@@ -72,6 +72,14 @@ MODELICA = Chart(
         Transition("engage_at_rest", "free", "stuck", guard="N > 0"),
     ),
     reference="Otter, Elmqvist and Mattsson (1999)",
+    layout={
+        "stuck": (320, 0),
+        "start_backward": (0, 190),
+        "start_forward": (640, 190),
+        "backward": (115, 390),
+        "forward": (525, 390),
+        "free": (320, 550),
+    },
 )
 CHARTS = (
     Entry(
