@@ -47,6 +47,7 @@ from gms_fsm.app.verbs.runs import (
 )
 from gms_fsm.app.verbs.traces import animate_command, play_command, plot_command, replay_command
 from gms_fsm.errors import GMSError
+from gms_fsm.scenarios import shipped
 
 
 @dataclass
@@ -77,6 +78,7 @@ _MEANT = {
     "version": "--version",
     "new": "copy",
     "optimise": "fit",
+    "figures": "plot",
 }
 
 
@@ -136,10 +138,12 @@ class _Verb(TyperCommand):
                 yield f"A key is changed by --set {each}"
             if "--law" in known and each in LAWS:
                 yield f"A law is chosen by --law {each}"
-        parted = re.search(r"--set ([\w.]+)(?: = ?|= | (?=[-\d\[]))([^\s=]+)", " ".join(args))
+        between = r"--(set|vary) ([\w.]+)(?: = ?|= | (?=[-\d\[]))([^\s=]+)"
+        parted = re.search(between, " ".join(args))
         extra = re.search(r"unexpected extra argument.*\(([^\s=]+[./\\][^\s=]*)\)", message)
         if parted:
-            yield f"A key is changed without blanks: --set {parted[1]}={parted[2]}"
+            what = "key is changed" if parted[1] == "set" else "range is given"
+            yield f"A {what} without blanks: --{parted[1]} {parted[2]}={parted[3]}"
         elif "-out" in args and "--output" in known:
             folder = dict(itertools.pairwise(args)).get("-out", "...")
             yield f"What is written is named by -o {folder}"
@@ -167,6 +171,10 @@ class _Verb(TyperCommand):
         before = dict(zip(args[1:], args, strict=False)).get(surplus, "")
         if before in flags:
             yield f"{before} takes no value: leave {surplus} out"
+        elif not any(param.param_type_name == "argument" for param in self.params):
+            yield f"What is written is named by -o {surplus}"
+        elif self.name == "run" and (name := f"{before}_{surplus}") in shipped():
+            yield f"Did you mean {name!r}?"
         elif self.name == "run":
             yield f"It runs one scenario at a time: gms-fsm run {surplus} is another call"
 

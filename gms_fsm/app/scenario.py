@@ -260,6 +260,10 @@ def scenario_file(given: str | Path) -> Path:
                 place=str(path),
                 advice="`gms-fsm copy servo` gives an example",
             )
+        case ".toml" if path.stem in shipped() and len(path.parts) == 1 and not path.exists():
+            raise ScenarioError(
+                "no such file", place=path.name, advice=f"that of the package is {path.stem!r}"
+            )
         case "" if len(path.parts) == 1 and not path.exists():
             if path.with_suffix(".toml").is_file():
                 raise ScenarioError(

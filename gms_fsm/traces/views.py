@@ -332,5 +332,6 @@ CALLED = {  # what other programs have, and what it is here
     "state": "trace.states",
     "events": "trace.transitions",
     "plot": "plots.overview(trace)",
+    "at": "trace.sample([t])",
     "to_csv": "trace.save('run.csv')",
 }

@@ -29,7 +29,7 @@ from gms_fsm.session.session import Session
 from gms_fsm.session.tree.branches import Tree
 from gms_fsm.session.tree.export import save_scenario
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.mounted import Mounted
+from gms_fsm.systems.mounted import Mounted, arguments_of
 from gms_fsm.systems.numbers import (
     NUMBERS,
     NamedNumber,
@@ -62,7 +62,7 @@ _TABLE = re.compile(r"\[\[?([\w.]+)\]\]?")
 _LINE = re.compile(r"([\w.]+) = (-?[\d.]\S*|\[[-\d.e+, ]+\])")
 
 
-@refusing()
+@refusing(rig="play(model, rig, t_end), or play(system, t_end); plots.replay shows a trace")
 def play(
     model: Model | System,
     rig: Rig | float,
@@ -115,9 +115,11 @@ def play(
     >>> page = play(model, PulledSlider(1.0, 2.0, 0.1), 60.0, vary={"F_s": (0.5, 3.0)})
     >>> page.save("page.html")  # doctest: +SKIP
     """
+    arguments_of("play", model, rig, t_end)
     given = {} if vary is None else vary
     if settings is None and "engine" not in options:
-        fast = importlib.util.find_spec("llvmlite") is not None
+        ours = not isinstance(options.get("method"), type)
+        fast = ours and importlib.util.find_spec("llvmlite") is not None
         options["engine"] = "compiled" if fast else "ifelse"
     options.pop("t_eval", None)
     more: Any = {"t_start": t_start, "initial": initial, "settings": settings}
