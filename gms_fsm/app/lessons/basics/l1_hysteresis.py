@@ -66,7 +66,7 @@ def inner_loop(b):
     ax = figure.subplots()
     ax.plot(1e6 * trace.x, trace.F)
     ax.plot(1e6 * turn.x, turn.F, "o", markersize=9, markerfacecolor="none")
-    ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]", title=f"reversals at 20 um and at {b:g} um")
+    ax.set(xlabel="$x$ [µm]", ylabel="$F$ [N]", title=f"reversals at 20 µm and at {b:g} µm")
     return figure
 
 

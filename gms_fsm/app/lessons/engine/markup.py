@@ -23,7 +23,19 @@ HERE = Path(__file__).parent
 _MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
 _CODE = re.compile(r"(```.*?^```|``.*?``|`[^`]*`)", re.DOTALL | re.MULTILINE)
 _STAR = re.compile(r"(?<!\*)\*(?!\*)")  # not those of **bold**
+_MICRO = re.compile(r"\bum\b")
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
+
+
+def typeset(text: str) -> str:
+    """Return words of a terminal as a page has them.
+
+    Examples
+    --------
+    >>> typeset("in um, at 3 um/s; a drum")
+    'in µm, at 3 µm/s; a drum'
+    """
+    return _MICRO.sub("µm", text)
 
 
 def html_of(text: str, *, links: bool = False) -> str:
@@ -36,7 +48,7 @@ def html_of(text: str, *, links: bool = False) -> str:
     """
     parts = _CODE.split(text)
     plain = [part if links else _LINK.sub(r"\1", part) for part in parts[::2]]
-    parts[::2] = [_STAR.sub(r"\*", part) for part in plain]
+    parts[::2] = [_STAR.sub(r"\*", typeset(part)) for part in plain]
     rendered: str = _MARKDOWN.render("".join(parts))
     return rendered
 

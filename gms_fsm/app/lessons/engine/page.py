@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gms_fsm.app.lessons.engine.markup import HERE, asked_of, filled, html_of, picture_of
+from gms_fsm.app.lessons.engine.markup import HERE, asked_of, filled, html_of, picture_of, typeset
 from gms_fsm.app.lessons.engine.predict import Question
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def live_page(result: Result) -> Replay:
             "level": lesson.level.capitalize(),
             "drag": escape(drag),
             "fields": "\n".join(map(_field, range(1, 9), lesson.questions)),
-            "lines": "\n".join(f"<p>{escape(line)}</p>" for line in result.lines()[1:]),
+            "lines": "\n".join(f"<p>{escape(typeset(line))}</p>" for line in result.lines()[1:]),
             "figure": picture_of(result),
             "asked": _asked(result),
         },
@@ -64,7 +64,7 @@ def _listed(names: list[str]) -> str:
 
 
 def _field(number: int, question: Question) -> str:
-    name, hint = f"answer-{number}", escape(question.hint)
+    name, hint = f"answer-{number}", escape(typeset(question.hint))
     if question.choices:
         options = "".join(f"<option>{escape(each)}</option>" for each in ("", *question.choices))
         entry, hint = f'<select id="{name}">{options}</select>', ""
@@ -78,7 +78,10 @@ def _field(number: int, question: Question) -> str:
 
 def _asked(result: Result) -> str:
     """Return questions and measured values as JSON that cannot end its element."""
-    questions = [asdict(each) | {"tolerance": each.tolerance} for each in result.lesson.questions]
+    questions = [
+        asdict(each) | {"tolerance": each.tolerance, "unit": typeset(each.unit)}
+        for each in result.lesson.questions
+    ]
     measured = [result.values[each.name] for each in result.lesson.questions]
     plain = [each if isinstance(each, str) else float(np.asarray(each)) for each in measured]
     return json.dumps({"questions": questions, "measured": plain}).replace("<", "\\u003c")
