@@ -15,16 +15,16 @@ from plots.figures._layout import fitted, legend_below, low, narrow, sheet
 from plots.figures._parts import element_legend, lanes_height, letter_panels
 from plots.panels.held_outputs import HeldLag
 from plots.panels.parts.axes import MANY, beside, first_variable
-from plots.panels.parts.selection import checked_elements, checked_window, scaled, shown
+from plots.panels.parts.selection import scaled
 from plots.style import INK, LINE_GREY, REPORTED, TEXT_GREY
 from plots.style.matplotlib import Axes, Figure, rc_context
 from plots.style.presets import font, pt, settings, to_scale
-from plots.views.window import Window
 
 Floats = NDArray[np.float64]
 REACHED = "$±s(v)$ away from reversals"
 INSET = (0.48, 0.81, 0.51, 0.18)  # of a panel: left, bottom, width, height
 ALIKE = 0.01  # of the largest deflection: curves that are closer look like one
+HELD_UNTIL, HELD_ZOOM = 6.0, 1.5  # s: end of what is shown, and where it is seen closer
 ZOOM = 0.012  # half of the time of an inset, of the whole time
 FIG3_PHASES = (("$F_a$ rises", 2.0), ("$F_a$ falls", 4.0), ("$F_a$ oscillates", np.inf))
 
@@ -39,7 +39,6 @@ def figure_3(
     phases: Sequence[tuple[str, float]] = FIG3_PHASES,
     limit: float | None = None,
     reason: str = "",
-    window: Window | None = None,
 ) -> Figure:
     """Draw Fig. 3: the applied force, and F against x for chart, if-else and LuGre.
 
@@ -57,8 +56,6 @@ def figure_3(
         Upper end of the F axis [N]; a higher peak is given as text.
     reason : str
         Why there is such a peak, added to this text.
-    window : (float, float), optional
-        Time interval to show, s.
 
     Returns
     -------
@@ -68,7 +65,7 @@ def figure_3(
     Raises
     ------
     ParameterError
-        If there is not one force per row, or the window is not within the runs.
+        If there is not one force per row.
     """
     if np.shape(force) != chart.t.shape:
         raise ParameterError(
@@ -79,13 +76,13 @@ def figure_3(
         figure = sheet(4.2, 8.8) if narrow() else sheet(9.0, 6.2)
         axes = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
         axes[0].plot(chart.t, force, color=INK, linewidth=pt(0.9))
-        axes[0].set_xlim(*checked_window(chart, window))
+        axes[0].set_xlim(chart.t[0], chart.t[-1])
         axes[0].set(xlabel="$t$ [s]", ylabel=r"$F_a$ [N]")
         runs = chart, ifelse, lugre
         # Drift is compared: one unit and the same axes.
         scale = scaled(np.concatenate([trace.x - trace.x[0] for trace in runs]), "m")
         for ax, trace in zip(axes[1:], runs, strict=True):
-            panels.hysteresis(ax, trace, phases, window=window, scale=scale)
+            panels.hysteresis(ax, trace, phases, scale=scale)
             ax.sharex(axes[1])
             ax.sharey(axes[1])
             peak = int(trace.F.argmax())
@@ -102,37 +99,25 @@ def figure_3(
     return fitted(figure)
 
 
-def figure_4(
-    chart: Trace,
-    ifelse: Trace,
-    lugre: Trace,
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-) -> Figure:
+def figure_4(chart: Trace, ifelse: Trace, lugre: Trace) -> Figure:
     """Draw Fig. 4: velocity, deflections and forces for chart, if-else and LuGre.
 
     Parameters
     ----------
     chart, ifelse, lugre : Trace
         The three runs.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Elements whose deflections are shown, counted from 0; by default all.
 
     Returns
     -------
     Figure
         Panels a to f. Insets show the first peak of F, except on a slide.
     """
-    chart, ifelse, lugre = (shown(trace, window) for trace in (chart, ifelse, lugre))
     with rc_context(settings()):
         figure = sheet(4.2, 10.0) if narrow() else sheet(10.5, 6.2)
         axes = figure.subplots(*(6, 1) if narrow() else (2, 3), sharex=True).ravel()
         panels.velocity(axes[0], chart)
         scale = _common_scale(chart, lugre)
-        panels.deflections(axes[1], chart, elements=elements, scale=scale)
+        panels.deflections(axes[1], chart, scale=scale)
         element_legend(figure, axes[1])
         panels.deflections(axes[2], lugre, scale=scale)
         for ax, trace in zip(axes[3:], (chart, ifelse, lugre), strict=True):
@@ -203,22 +188,13 @@ def _make_room(ax: Axes) -> None:
     ax.set_ylim(bottom, bottom + (top - bottom) / 0.74)
 
 
-def compare_laws(
-    runs: Mapping[str, Trace],
-    *,
-    window: Window | None = None,
-    elements: Sequence[int] | None = None,
-) -> Figure:
+def compare_laws(runs: Mapping[str, Trace]) -> Figure:
     """Draw runs side by side, one column each: deflections, friction, states.
 
     Parameters
     ----------
     runs : mapping of str to Trace
         Column titles and runs.
-    window : (float, float), optional
-        Time interval to show, s.
-    elements : sequence of int, optional
-        Which elements, counted from 0; by default all.
 
     Returns
     -------
@@ -226,57 +202,47 @@ def compare_laws(
         Three rows.
     """
     with rc_context(settings()):
-        count = max(len(checked_elements(run, elements)) for run in runs.values())
+        count = max(run.n for run in runs.values())
         tall = lanes_height(count, 2.1) if count > MANY else 2.1, 2.1, lanes_height(count, 1.4)
         figure = sheet(5.2 * len(runs), sum(tall) + 1.6)
         grid = figure.subplots(
             3, len(runs), sharex=True, sharey="row", squeeze=False, height_ratios=tall
         )
         scale = _common_scale(*runs.values())
-        for column, run in zip(grid.T, runs.values(), strict=True):
-            trace = shown(run, window)
+        for column, trace in zip(grid.T, runs.values(), strict=True):
             many = count > MANY and all(map(panels.has_threshold, runs.values()))
             if many:
-                panels.heat(column[0], trace, elements=elements)
+                panels.heat(column[0], trace)
             else:
-                panels.deflections(column[0], trace, elements=elements, scale=scale)
+                panels.deflections(column[0], trace, scale=scale)
             panels.force(column[1], trace)
-            panels.ribbons(column[2], trace, elements=elements)
+            panels.ribbons(column[2], trace)
             for sign in (1, -1) if panels.has_threshold(trace) and not many else ():
                 level = sign * float(np.nanmin(trace.s)) * (scale[0] if scale else 1.0)
                 column[0].axhline(
                     level, color=LINE_GREY, linewidth=pt(0.9), zorder=0, label=REACHED
                 )
             if not many:
-                _coinciding(column[0], trace, elements)
+                _coinciding(column[0], trace)
             for ax in column[:2]:
                 ax.set_xlabel("")
         letter_panels(grid[0], list(runs))
-        entries: dict[str, Any] = {}
-        for ax in (grid[0, 0], grid[2, 0]):
-            handles, labels = ax.get_legend_handles_labels()
-            entries |= dict(zip(labels, handles, strict=True))
-        legend_below(figure, list(entries.values()), list(entries))
+        element_legend(figure, grid[0, 0], grid[2, 0])
     return fitted(figure)
 
 
-def _coinciding(ax: Axes, trace: Trace, elements: Sequence[int] | None) -> None:
+def _coinciding(ax: Axes, trace: Trace) -> None:
     """Say so, if the deflections of all elements cannot be told apart."""
-    chosen = checked_elements(trace, elements)
-    if len(chosen) < 2 or not trace.model.chart.variables:
+    if trace.n < 2 or not trace.model.chart.variables:
         return
-    z = trace.z[:, chosen]
-    if np.nanmax(np.ptp(z, axis=1)) < ALIKE * np.nanmax(np.abs(z)):
-        said = f"$z_{{{chosen[0] + 1}}}$ to $z_{{{chosen[-1] + 1}}}$ coincide"
+    if np.nanmax(np.ptp(trace.z, axis=1)) < ALIKE * np.nanmax(np.abs(trace.z)):
+        said = f"$z_{{1}}$ to $z_{{{trace.n}}}$ coincide"
         look: dict[str, Any] = {"ha": "right", "va": "bottom", "color": TEXT_GREY}
         ax.text(0.98, 0.04, said, transform=ax.transAxes, **look)
 
 
 def residuals(
-    runs: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]],
-    title: str,
-    *,
-    log: bool = True,
+    runs: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]], title: str
 ) -> Figure:
     """Draw differences of forces over time.
 
@@ -286,8 +252,6 @@ def residuals(
         Panel titles, times [s] and differences [N].
     title : str
         Of the figure.
-    log : bool
-        Draw their magnitudes on a logarithmic axis.
 
     Returns
     -------
@@ -298,14 +262,9 @@ def residuals(
         figure = sheet(9.0, 2.4 * len(runs) + 0.4)
         axes = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
         for ax, (times, difference) in zip(axes, runs.values(), strict=True):
-            panels.difference(ax, times, difference, log=log)
+            panels.difference(ax, times, difference)
         letter_panels(list(axes), list(runs))
-        entries: dict[str, Any] = {}
-        for ax in axes:
-            handles, labels = ax.get_legend_handles_labels()
-            entries |= dict(zip(labels, handles, strict=True))
-        if entries:
-            legend_below(figure, list(entries.values()), list(entries))
+        element_legend(figure, *axes)
         figure.suptitle(title, x=0.01, ha="left")
     return fitted(figure)
 
@@ -316,8 +275,6 @@ def held_residuals(
     *,
     title: str,
     phases: Mapping[str, tuple[float, float]],
-    until: float = 6.0,
-    zoom: float = 1.5,
 ) -> Figure:
     """Draw how a chart with held outputs differs from the law evaluated inside the steps.
 
@@ -331,22 +288,19 @@ def held_residuals(
         Of the figure.
     phases : mapping of str to (float, float)
         Names and time intervals [s], at most two, in which the largest difference is taken.
-    until : float
-        s: end of the time shown in a and b.
-    zoom : float
-        s: begin of the time shown in c, which lasts two of the longest sample times.
 
     Returns
     -------
     Figure
-        Panels a to d.
+        Panels a to d; c lasts two of the longest sample times.
     """
     with rc_context(settings()):
         figure = sheet(4.2, 9.2) if narrow() else sheet(9.0, 6.2)
         force, place, between, period = figure.subplots(*(4, 1) if narrow() else (2, 2)).ravel()
-        lines = panels.lag_over_time(force, lags, papers[0], window=(0.0, until))
-        panels.lag_over_time(place, lags, papers[1], window=(0.0, until), place=True)
-        panels.lag_between_ticks(between, lags, papers[0], window=(zoom, zoom + 2 * lags[0].period))
+        lines = panels.lag_over_time(force, lags, papers[0], window=(0.0, HELD_UNTIL))
+        panels.lag_over_time(place, lags, papers[1], window=(0.0, HELD_UNTIL), place=True)
+        closer = HELD_ZOOM, HELD_ZOOM + 2 * lags[0].period
+        panels.lag_between_ticks(between, lags, papers[0], window=closer)
         panels.lag_over_period(period, lags, papers, phases=phases)
         letter_panels(
             [force, place, between, period],

@@ -66,10 +66,11 @@ def lanes_height(count: int, least: float, lane: float = LANE) -> float:
 
 
 def element_legend(figure: Figure, *axes: Axes) -> None:
-    """Add one legend of elements and states below the figure."""
+    """Add one legend of what is in some panels below the figure, if anything is."""
     found = [ax.get_legend_handles_labels() for ax in axes]
     entries = {name: handle for pair in found for handle, name in zip(*pair, strict=True)}
-    legend_below(figure, list(entries.values()), list(entries))
+    if entries:
+        legend_below(figure, list(entries.values()), list(entries))
 
 
 def one_time_axis(column: Sequence[Axes]) -> None:

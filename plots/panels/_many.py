@@ -22,7 +22,7 @@ LEVELS = 256
 CROWDED = 40  # boundaries per lane that can be told apart
 
 
-def heat(ax: Axes, trace: Trace, *, bar: bool = True, **part: Unpack[PartOptions]) -> Artists:
+def heat(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
     """Draw |z| / s of each element as a row in grey levels, from white at 0 to ink at 1.
 
     Parameters
@@ -33,8 +33,6 @@ def heat(ax: Axes, trace: Trace, *, bar: bool = True, **part: Unpack[PartOptions
         The run.
     **part
         ``window`` and ``elements``.
-    bar : bool
-        Add a colour bar.
 
     Returns
     -------
@@ -81,11 +79,10 @@ def heat(ax: Axes, trace: Trace, *, bar: bool = True, **part: Unpack[PartOptions
         drawn.append(ax.vlines(times, *ends, color=INK, linewidth=pt(0.9)))
     lanes(ax, chosen)
     time_axis(ax, begin, end)
-    if bar:
-        side = ax.inset_axes((1.015, 0.0, 0.02, 1.0))
-        scale = ax.figure.colorbar(picture, cax=side, ticks=[0, 0.5, 1], extend="max")
-        scale.set_label("$|z| / s(v)$ [–]")
-        side.tick_params(length=2)
+    side = ax.inset_axes((1.015, 0.0, 0.02, 1.0))
+    scale = ax.figure.colorbar(picture, cax=side, ticks=[0, 0.5, 1], extend="max")
+    scale.set_label("$|z| / s(v)$ [–]")
+    side.tick_params(length=2)
     return drawn
 
 

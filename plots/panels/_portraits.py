@@ -27,6 +27,7 @@ PHASES: tuple[dict[str, Any], ...] = (
     {"color": LINE_GREY, "linestyle": "-", "linewidth": 0.9},
 )
 MOST_ARROWS = 500  # looked at along one path
+APART = 1.1  # inches along the path, between arrows
 OVERLAP, REPEATED = 0.22, 0.7  # inches between arrows, and between those of the same direction
 SHAFT = 0.05  # inches of the path whose direction an arrow has
 STRAIGHT = 0.8  # cosine of the angle between an arrow and the path around it, at least
@@ -182,8 +183,10 @@ def hysteresis(
     return lines
 
 
-def arrows(ax: Axes, lines: LineCollection, *, apart: float = 1.1) -> Artists:
+def arrows(ax: Axes, lines: LineCollection) -> Artists:
     """Draw arrowheads along a portrait, in the direction of time.
+
+    Where a path repeats itself, only the first arrow of several close ones is drawn.
 
     Parameters
     ----------
@@ -191,9 +194,6 @@ def arrows(ax: Axes, lines: LineCollection, *, apart: float = 1.1) -> Artists:
         Axes with the portrait, as large as they will be.
     lines : LineCollection
         From `portrait` or `hysteresis`; its pieces are in the order of time.
-    apart : float
-        Distance along the path, inches. Where a path repeats itself, only the first arrow of
-        several close ones is drawn.
 
     Returns
     -------
@@ -211,7 +211,7 @@ def arrows(ax: Axes, lines: LineCollection, *, apart: float = 1.1) -> Artists:
     path, length = path[moved], np.concatenate([[0.0], np.cumsum(steps[steps > 0])])
     if not length[-1] > 0:
         return []
-    apart = max(apart, length[-1] / MOST_ARROWS)
+    apart = max(APART, length[-1] / MOST_ARROWS)
     look: dict[str, Any] = {"arrowstyle": "-|>,head_length=0.5,head_width=0.25"}
     look |= {"color": INK, "linewidth": pt(0.0), "shrinkA": 0, "shrinkB": 0, "mutation_scale": 11}
     drawn: Artists = []

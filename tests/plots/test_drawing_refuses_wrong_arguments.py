@@ -172,8 +172,6 @@ LATE = np.array([20.0, 30.0])
     [
         (lambda: figures.Measured(np.zeros(2), np.zeros(2), np.zeros(3)), "equally long"),
         (lambda: figures.Measured(np.array([1.0, 0.0]), LATE, LATE), "goes backward"),
-        (lambda: panels.residual(ax(), run(), figures.Measured(LATE, LATE, LATE)),
-         "20 to 30 s; it must overlap 0 to 10 s"),
         (lambda: panels.difference(ax(), np.zeros(3), np.zeros(2)),
          r"shape \(3,\), the difference \(2,\)"),
         (lambda: figures.figure_3(run(), run(), run(), np.zeros(2), title=""),

