@@ -171,7 +171,7 @@ class _Verb(TyperCommand):
         before = dict(zip(args[1:], args, strict=False)).get(surplus, "")
         if before in flags:
             yield f"{before} takes no value: leave {surplus} out"
-        elif not any(param.param_type_name == "argument" for param in self.params):
+        elif self.name == "class":
             yield f"What is written is named by -o {surplus}"
         elif self.name == "run" and (name := f"{before}_{surplus}") in shipped():
             yield f"Did you mean {name!r}?"
