@@ -92,17 +92,7 @@ def _is_place(node: ast.expr) -> bool:
 
 @dataclass(frozen=True)
 class Source:
-    """The text of a function.
-
-    Parameters
-    ----------
-    function : callable
-        The function.
-    lines : list of str
-        Of its file.
-    definition : ast.FunctionDef
-        Its tree.
-    """
+    """The text of a function."""
 
     function: Any
     lines: list[str]

@@ -37,36 +37,19 @@ class Learnt:
 
     A variable has one meaning in the whole function, which must be known where it is read, and this
     may be before its last assignment.
-
-    Parameters
-    ----------
-    kinds : dict of str to str
-        Kinds of variables that are wider than their first assignments say.
-    varying : set of str
-        Parts of variables that are not the same in all assignments.
     """
 
-    kinds: dict[str, str] = field(default_factory=dict)
-    varying: set[str] = field(default_factory=set)
+    kinds: dict[str, str] = field(default_factory=dict)  # wider than first assignments say
+    varying: set[str] = field(default_factory=set)  # parts that not all assignments have alike
 
 
 @dataclass(frozen=True)
 class Specialised:
-    """A function for arguments of certain types, and what it returns, in terms of parameters.
-
-    Parameters
-    ----------
-    function : TypedFunction
-        The translated function.
-    result : Value or None
-        What it returns.
-    slots : tuple of Local
-        The locals in `result` that stand for returned numbers.
-    """
+    """A function for arguments of certain types, and what it returns, in terms of parameters."""
 
     function: TypedFunction
     result: Value | None
-    slots: tuple[Local, ...]
+    slots: tuple[Local, ...]  # the locals in `result` that stand for returned numbers
 
 
 class Translating(Protocol):
@@ -87,17 +70,7 @@ class Translating(Protocol):
 
 
 class Work:
-    """The translation of one function.
-
-    Parameters
-    ----------
-    translator : Translating
-        Of its module.
-    function : callable
-        The Python function.
-    learnt : Learnt
-        From previous attempts; changed in place.
-    """
+    """The translation of one function."""
 
     def __init__(
         self, translator: Translating, function: Callable[..., Any], learnt: Learnt
