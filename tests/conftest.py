@@ -25,6 +25,7 @@ SLOW_EXAMPLES = (
     "gms_fsm/app/lessons/",
     "gms_fsm/identification/choose.py",
     "gms_fsm/identification/fit.py",
+    "gms_fsm/generation/generate.py",
     "plots/handouts/page.py",
     "plots/style/presets.py",
     "gms_fsm/exporters/alone.py",

@@ -125,6 +125,7 @@ def test_a_word_that_is_meant_is_named(gms_fsm: CommandLine) -> None:
     assert "Did you mean 'cover'?" in gms_fsm("coverage", "a.toml").err
 
 
+@pytest.mark.slow
 def test_generated_motions_are_files_that_count_the_same(cover: CommandLine) -> None:
     answer = cover("dog-clutch", "--generate", "-o", "out", "--seed", "3", "--bounds", "load=-1..1")
     assert answer.code == 0, answer.err

@@ -182,6 +182,7 @@ def test_pictures_of_rotations_have_units_of_rotations() -> None:
 
 
 # --------------------------------------------------------------------------- fits
+@pytest.mark.slow
 def test_a_fit_of_a_joint_has_units_of_rotations(tmp_path: Path) -> None:
     friction = LuGre(sigma_0=100.0, sigma_1=0.5, sigma_2=0.1, stribeck=Stribeck(1.0, 1.5, 0.05))
     t = np.linspace(0.0, 2.0, 401)

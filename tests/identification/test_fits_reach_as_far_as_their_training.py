@@ -34,6 +34,7 @@ def stroke(begin: float, end: float, record: Record | None = None) -> Record:
     return (rubbed(12.0) if record is None else record).between(begin, end)
 
 
+@pytest.mark.slow
 def test_a_state_is_estimated_from_the_first_seconds() -> None:
     short = stroke(9.3, 9.75)  # no way back: no run-in, and all elements are deflected
     found = plain()
@@ -50,6 +51,7 @@ def test_a_given_state_is_where_a_prediction_begins() -> None:
     assert high - low == pytest.approx(6e-5 * (found["k1"].value + found["k2"].value), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_gap_splits_a_fit_and_the_state_behind_it_is_found() -> None:
     record = rubbed(6.0)
     t = record.columns["time"]

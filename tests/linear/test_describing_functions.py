@@ -110,6 +110,7 @@ def balance(F_s: float, w: np.ndarray, level: np.ndarray) -> np.ndarray:
     return found
 
 
+@pytest.mark.slow
 def test_hunting_is_predicted_with_stiction_and_not_without() -> None:
     w = np.linspace(2.2, 3.0, 9)
     with_stiction = balance(1.5, w, np.array([1.27, 1.28, 1.29, 1.3, 1.31]))

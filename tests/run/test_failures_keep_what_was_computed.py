@@ -112,6 +112,7 @@ def test_an_output_that_is_infinite_is_shown_as_infinite() -> None:
     assert np.isfinite(trace.F[1:]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [1e-8, 1e8])
 def test_a_run_at_extreme_parameters_ends_or_fails_with_a_message(k: float) -> None:
     curve = Stribeck(1e-6, 1e6, 1e-9)
