@@ -26,7 +26,10 @@ from tests.identification.records import (
     sine,
 )
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*outside of what was trained on")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore:.*outside of what was trained on"),
+]
 T = np.arange(0.0, 12.0, 0.01)
 
 
@@ -34,7 +37,6 @@ def stroke(begin: float, end: float, record: Record | None = None) -> Record:
     return (rubbed(12.0) if record is None else record).between(begin, end)
 
 
-@pytest.mark.slow
 def test_a_state_is_estimated_from_the_first_seconds() -> None:
     short = stroke(9.3, 9.75)  # no way back: no run-in, and all elements are deflected
     found = plain()
@@ -51,7 +53,6 @@ def test_a_given_state_is_where_a_prediction_begins() -> None:
     assert high - low == pytest.approx(6e-5 * (found["k1"].value + found["k2"].value), rel=1e-3)
 
 
-@pytest.mark.slow
 def test_a_gap_splits_a_fit_and_the_state_behind_it_is_found() -> None:
     record = rubbed(6.0)
     t = record.columns["time"]
@@ -120,7 +121,6 @@ def test_records_count_alike_if_asked_and_where_lengths_differ_much() -> None:
     assert weighed[0] == pytest.approx(weighed[1])
 
 
-@pytest.mark.slow
 def test_a_play_bank_is_found_without_a_search() -> None:
     x = 3e-2 * np.sin(2.0 * np.pi * T / 3.0)
     z = stop_operators(np.concatenate([x, x]), [6e-3])[-x.size :, 0]
@@ -133,7 +133,6 @@ def test_a_play_bank_is_found_without_a_search() -> None:
 
 
 @pytest.mark.every(3)
-@pytest.mark.slow
 @pytest.mark.parametrize("smoothing", [0.0, 0.002, 0.005, 0.01, 0.02])
 def test_an_inertia_under_a_smoothing_is_covered_or_doubted(smoothing: float) -> None:
     t = np.arange(1000) * 0.005

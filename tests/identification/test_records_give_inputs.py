@@ -13,6 +13,7 @@ from gms_fsm.errors import RecordError
 from gms_fsm.identification.joints import JOINTS, joint_candidates, joint_chart
 from tests.helpers import FASTEST
 
+pytestmark = pytest.mark.slow
 LOADED = joint_chart("loaded", "F_0 + mu * abs(N)", ["N"])
 TRUTH: dict[str, Any] = {"sigma_0": 4e4, "b": 5.0, "F_0": 0.5, "mu": 0.12}
 START = ChartModel(LOADED, {**TRUTH, "mu": 0.2, "F_0": 0.3}, inputs={"N": "N"})
@@ -71,7 +72,6 @@ def test_candidates_are_those_whose_inputs_are_given() -> None:
     assert not {"load and temperature", "directional load (M5)", "gear loss"} & names
 
 
-@pytest.mark.slow
 def test_choose_says_why_the_others_lost() -> None:
     records = [loaded(n) for n in (20.0, 60.0, 130.0)]
     some = [each for each in JOINTS if each.name in ("load (M3)", "Coulomb, viscous (M1)")]

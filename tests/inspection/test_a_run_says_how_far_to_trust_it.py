@@ -328,6 +328,7 @@ def test_a_function_that_is_seen_often_enough_is_not_doubted():
     assert not simulate(model, Slider(1.0, force), 10.0).trust().of("sampling")
 
 
+@pytest.mark.slow
 def test_no_row_is_not_finite_without_an_error_or_a_finding():
     for seed in range(25):
         name, trace = extreme(random.Random(seed))
