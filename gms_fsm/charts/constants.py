@@ -22,9 +22,10 @@ def named_constants(chart: Chart) -> tuple[Chart, dict[str, float]]:
 
     Examples
     --------
-    >>> from gms_fsm.charts import State, Transition
+    >>> from gms_fsm import Chart, State, Transition
     >>> edges = (Transition("opens", "shut", "open", guard="abs(v) > 0.3 and v**2 > 0"),)
-    >>> door = Chart("door", states=(State("shut"), State("open")), transitions=edges)
+    >>> states = State("shut"), State("open")
+    >>> door = Chart("door", states=states, transitions=edges, outputs={"F": "0"})
     >>> named, values = named_constants(door)
     >>> named.transitions[0].guard, values, named.unit("opens_at")
     ('abs(v) > opens_at and v**2 > 0', {'opens_at': 0.3}, 'm/s')
