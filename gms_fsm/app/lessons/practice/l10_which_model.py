@@ -223,7 +223,7 @@ def _sheet(heading: str, r: Result) -> tuple[Any, list[Any]]:
     notes = ["threshold", *(form[name].format(r.limits[name]) for name in names)]
     figure = figures.phenomena_matrix(r.table, title=heading, notes=notes, below=2.7)
     high = figure.get_figheight()
-    places = [(left, 0.5 / high, 0.235, 1.95 / high) for left in (0.085, 0.41, 0.745)]
+    places = [(left, 0.5 / high, 0.235, 1.95 / high) for left in (0.075, 0.415, 0.75)]
     return figure, [figure.add_axes(place) for place in places]
 
 
@@ -237,7 +237,7 @@ def _drift(ax: Any, r: Any) -> str:
     _curve(ax, r, "gms-signed", "drift", **FIRST | {"linewidth": 0.9})
     _curve(ax, r, "elasto-plastic", "drift", **SECOND | {"linewidth": 0.9})
     note(ax, NAMES["lugre"], (6.5, 55.0))
-    note(ax, NAMES["gms-signed"], (10.5, 14.0), color=INK)
+    note(ax, NAMES["gms-signed"], (9.5, 14.0), color=INK)
     note(ax, "elasto-plastic", (10.5, -6.5))
     ax.set(xlabel="$t$ [s]", ylabel="$x$ [µm]", xlim=(0, 24), ylim=(-10, 95))
     return "bias and ripple: LuGre drifts"
