@@ -152,9 +152,9 @@ class RepeatedRun:
         log: Any = self.columns.log
         log.stops_t = np.empty(0)
         rows, every = len(others), [each for group in slopes for each in group]
-        first = 1 + len(every)
-        table = np.empty((len(values), rows, first + others.shape[1]))
-        table[:, :, first:] = others
+        before = 1 + len(every)
+        table = np.empty((len(values), rows, before + others.shape[1]))
+        table[:, :, before:] = others
         cells, passes = list[tuple[int, int, int]](), [0]
         for group in slopes:
             for each in group:
