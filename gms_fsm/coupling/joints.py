@@ -180,9 +180,7 @@ class Joints:
             raise in_use()
         try:
             now = self.t
-            end = now + dt
-            if end > LATEST:
-                raise _too_late(end)
+            end = _in_reach(now + dt)
             before = self._copy()
             try:
                 return self._step(v0, v1, end, inputs, {}, now)
@@ -336,9 +334,7 @@ def end_of(now: float, dt: float) -> float:
             value=dt,
             advice="start at a smaller t=...",
         )
-    if end > LATEST:
-        raise _too_late(end)
-    return end
+    return _in_reach(end)
 
 
 def end_at(now: float, t: Any) -> float:
@@ -351,14 +347,14 @@ def end_at(now: float, t: Any) -> float:
             value=end,
             advice="restore a snapshot to go back",
         )
-    if end > LATEST:
-        raise _too_late(end)
-    return end
+    return _in_reach(end)
 
 
-def _too_late(t: float) -> ParameterError:
-    """Return the error for the end of a sample that the clock cannot resolve."""
-    return ParameterError("it is too large", place="t", value=t, advice=f"at most {LATEST:g} s")
+def _in_reach(t: float) -> float:
+    """Return the end of a sample, unless the clock cannot resolve it."""
+    if t > LATEST:
+        raise ParameterError("it is too large", place="t", value=t, advice=f"at most {LATEST:g} s")
+    return t
 
 
 def input_lines(given: Mapping[str, Any], known: Iterable[str], checked: Any) -> dict[str, Line]:

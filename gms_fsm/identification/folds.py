@@ -33,6 +33,7 @@ class Folds:
 
     all: tuple[Record, ...]  # everything
     parts: Parts  # fitted to, and left out
+    # By amplitude and by speed, where records differ in them.
     others: Mapping[str, Parts] = field(default_factory=dict)
 
 

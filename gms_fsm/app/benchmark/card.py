@@ -28,7 +28,7 @@ class Row:
     free: int | None = None  # number of unknowns; None where it is not known
     train_rmse: float | None = None  # on training rows, N
     rmse: float | None = None  # on what was held out, N
-    r2: float | None = None  # the same
+    r2: float | None = None  # on what was held out
     seconds: float | None = None  # time for all splits
     by_record: dict[str, float] = field(default_factory=dict)  # RMSE of each held-out record, N
     note: str = ""  # what to know, or why it failed

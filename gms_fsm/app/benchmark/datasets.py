@@ -36,7 +36,7 @@ class DataSet:
     held_out: str  # the rule, in words
     smoothing: float | None  # time constant of the motion, s
     splits: Callable[[Path], tuple[Split, ...]]  # reads a folder
-    published: Mapping[str, Mapping[str, float]]  # errors that others reported
+    published: Mapping[str, Mapping[str, float]]  # of others: model, record, N
 
 
 def _tribometer(folder: Path) -> tuple[Split, ...]:

@@ -87,11 +87,12 @@ class Assessed:
     """What is known about the unknowns of a fit."""
 
     table: tuple[Estimate, ...]
-    covariance: FloatArray  # shape (p, p); Of their values, in the order of the table
+    covariance: FloatArray  # (p, p) of their values, in the order of the table
     certainty: Certainty  # in coordinates
     weakest: str  # the weakest direction in words
-    better: Point | None = None  # A point met on the walk that fits clearly better on few rows
-    open_profiles: tuple[Profile, ...] = ()  # of the parameters that cannot be told
+    better: Point | None = None  # a point met on the walk that fits clearly better on few rows
+    # Of the parameters that cannot be told, the least rise met on the walk: it is at most as high.
+    open_profiles: tuple[Profile, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,10 +54,12 @@ class Region:
     """What was met on a walk through the likelihood region."""
 
     best: dict[str, float]  # the values of the best point, by name
-    met: dict[str, FloatArray]  # shape (points,); Those of all points met, the best one first
-    rise: FloatArray  # shape (points,); Fall of twice the log-likelihood at each
+    met: dict[str, FloatArray]  # (points,) those of all points met, the best one first
+    rise: FloatArray  # (points,) fall of twice the log-likelihood at each
     lowest: Point  # the point with the lowest cost
-    shares: dict[str, float]  # of the highest rise inside the region, by name
+    # Of the highest rise inside the region: correlated noise moves what acts fast less than what
+    # acts slowly, on which all effective rows count.
+    shares: dict[str, float]
 
     @property
     def better(self) -> Point | None:

@@ -70,15 +70,15 @@ def correlation_time(parts: Sequence[FloatArray]) -> float:
 class Certainty:
     """What the data say about all unknowns together, in coordinates."""
 
-    covariance: FloatArray  # shape
-    half: FloatArray  # shape (p,); Half widths of the 95 % intervals of the coordinates
-    open: FloatArray  # shape (p,); Which cannot be told
-    directions: FloatArray  # shape
-    spread: FloatArray  # shape
-    share: FloatArray  # shape
-    tau: float  # correlation time of the noise in rows, and the number of rows that count
-    effective: float  # correlation time of the noise in rows, and the number of rows that count
-    beyond: float = 1.0  # correlation time in rows of what is left without that noise
+    covariance: FloatArray  # (p, p) of the coordinates; infinite on the diagonal if untold
+    half: FloatArray  # (p,) half widths of the 95 % intervals of the coordinates
+    open: FloatArray  # (p,) which cannot be told
+    directions: FloatArray  # (p, p) combinations of coordinates, the best determined first
+    spread: FloatArray  # (p,) how far each can move within the noise: one standard deviation
+    share: FloatArray  # (p,) variance of each over that of a slow one, for which rows / tau count
+    tau: float  # correlation time of the noise, rows
+    effective: float  # the number of rows that count
+    beyond: float = 1.0  # that of what is left without that noise, rows; 1 if it may be chance
 
 
 def certainty(

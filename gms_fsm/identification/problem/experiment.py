@@ -51,8 +51,8 @@ class Point:
 
     u: FloatArray  # coordinates of what was searched
     linear: FloatArray  # what was solved for: the linear parameters, then the nuisance terms
-    residual: FloatArray  # shape (rows,); Model minus measurement, at the rows that count, weighted
-    lost: GMSError | None = None  # Why it could not be evaluated
+    residual: FloatArray  # (rows,) model minus measurement, at the rows that count, weighted
+    lost: GMSError | None = None  # why it could not be evaluated
 
     @property
     def cost(self) -> float:

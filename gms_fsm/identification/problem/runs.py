@@ -121,11 +121,11 @@ class Course:
     """What one record makes a model do."""
 
     record: Record  # the record
-    t: FloatArray  # shape (rows,); The motion at its rows: s, m/s, m
-    v: FloatArray  # shape (rows,); The motion at its rows: s, m/s, m
-    x: FloatArray  # shape (rows,); The motion at its rows: s, m/s, m
-    measured: FloatArray  # shape (rows,); What the model is compared with
-    rows: NDArray[np.bool_]  # shape (rows,); The rows that count
+    t: FloatArray  # (rows,) s
+    v: FloatArray  # (rows,) velocity, m/s or rad/s
+    x: FloatArray  # (rows,) position, m or rad
+    measured: FloatArray  # (rows,) what the model is compared with
+    rows: NDArray[np.bool_]  # (rows,) the rows that count
     lead: tuple[FloatArray, FloatArray]  # times and velocities before the first row
     budget: int  # steps a run may take
     inputs: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
