@@ -128,6 +128,7 @@ def play(
     what, hidden = with_named_constants(start.what)
     if hidden:
         tree = Tree(what, start.t_end, start.t_start, start.initial, start.chosen)
+    _ranges(what, given)  # refused before anything is printed, which takes seconds
     start, trace = tree.branch().start, tree.trace(0)
     engine = live_engine(start, trace.title)
     variants = [start, *(_variants(start) if len(engine.text) < LARGE else ())]

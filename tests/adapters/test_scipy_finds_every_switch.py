@@ -114,6 +114,7 @@ def _coupled(t: float, y: Any, F: Any) -> list[float]:
     return [v, 2.0 * (0.1 * t - x) - spring - F[0], v_b, spring - F[1]]
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_several_frictions() -> None:
     system = System(

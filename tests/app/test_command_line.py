@@ -201,6 +201,7 @@ def test_plot_animate_and_replay(gms_fsm: CommandLine) -> None:
 
 
 # --------------------------------------------------------------------------- exports
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_an_export_begins_where_its_scenario_begins(gms_fsm: CommandLine) -> None:
     t = np.round(0.5 + 0.01 * np.arange(60), 2)
@@ -214,6 +215,7 @@ def test_an_export_begins_where_its_scenario_begins(gms_fsm: CommandLine) -> Non
     assert 1e-3 < float(x[1]) < 5e-3  # m; the record says mm
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_an_exported_contact_has_the_tolerance_of_its_scenario(gms_fsm: CommandLine) -> None:
     Path("servo.toml").write_text(SERVO.read_text().replace("[run]", "[run]\nrtol = 1e-3"))

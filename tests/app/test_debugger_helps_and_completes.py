@@ -20,7 +20,7 @@ BEFORE = {  # so that there is something to clear, to compare and to load
 }
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("made", BEFORE)
 def test_the_examples_of_every_command_work(

@@ -63,6 +63,7 @@ def test_its_keys_and_defaults_are_those_of_the_function() -> None:
         assert getattr(defaults, name) == empty, name
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_system_is_fitted(gms_fsm: CommandLine, scenario: Path, tmp_path: Path) -> None:
     system = small().save(tmp_path / "first.toml").read_text(encoding="utf-8")

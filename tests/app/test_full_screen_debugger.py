@@ -53,6 +53,7 @@ def _all_said(app: FullScreen, texts: list[str]) -> None:
         assert text.replace("\n  by", " by") in said
 
 
+@pytest.mark.matrix
 def test_keys_find_out_why_on_a_small_screen() -> None:
     """Numbers before keys, moves, elements, zoom, help, colours; and out."""
 
@@ -308,6 +309,7 @@ def test_without_textual_the_extra_is_named(
     )
 
 
+@pytest.mark.matrix
 def test_a_key_without_its_number_asks_and_old_answers_go(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_app, "TRANSCRIPT", 20)
 

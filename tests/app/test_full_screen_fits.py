@@ -48,7 +48,7 @@ def _check(app: FullScreen, size: tuple[int, int]) -> set[str]:
     return seen
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("scenario", "sizes"),
     [

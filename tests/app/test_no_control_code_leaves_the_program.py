@@ -61,6 +61,7 @@ def test_the_escape_of_a_code_is_that_of_python_and_json() -> None:
     assert visible_lines("a\tb\n\u00a0c\r\n") == "a\tb\n\u00a0c\\u000d\n"
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("form", sorted({*formats()} - {"scxml"}))
 def test_an_export_has_no_control_code(form: str, model: ChartModel, tmp_path: Path) -> None:

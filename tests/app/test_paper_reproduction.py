@@ -188,6 +188,7 @@ def test_a_run_that_fails_leaves_its_part_and_the_runs_before_it(tmp_path: Path)
     assert Trace.load(tmp_path / "traces" / "fig3_chart.npz").t[-1] == paper.FIG3_END
 
 
+@pytest.mark.matrix
 def test_custom_signals_are_used_and_not_assessed(monkeypatch: pytest.MonkeyPatch) -> None:
     signals = ("0.1*t", "0.1*sin(t)")
     short = [replace(each, t_end=0.5) for each in held_by_the_fastest(*signals)]

@@ -41,6 +41,7 @@ def small_table() -> PhenomenaTable:
     return PhenomenaTable(titles, tuple(DRAWN.values()), tuple(cells))
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_table_becomes_a_page_numbers_and_pictures(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
@@ -63,6 +64,7 @@ def test_a_table_becomes_a_page_numbers_and_pictures(tmp_path: Path) -> None:
     assert "four" not in svg
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_model_and_a_file(gms_fsm: CommandLine) -> None:
     System(

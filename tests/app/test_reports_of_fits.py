@@ -82,6 +82,7 @@ def test_elements_that_never_slipped_are_named(
     assert "- fit as well" not in page
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_profiles_are_there_exactly_when_something_is_open(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="the figure needs the extra 'plots'")

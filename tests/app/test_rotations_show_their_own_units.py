@@ -79,8 +79,7 @@ def outputs(system: System, folder: Path) -> Iterable[tuple[str, str]]:
                     yield path.name, path.read_text(encoding="utf-8")
 
 
-@pytest.mark.every(2)
-@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", ["servo", "robot_joint"])
 def test_exports_of_rotations_have_units_of_rotations(name: str, tmp_path: Path) -> None:
     seen = set()
@@ -126,6 +125,7 @@ def test_the_debugger_shows_units_of_rotations(name: str) -> None:
     assert only_of_rotations(said), units_in(said, MASS)
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_the_full_screen_debugger_shows_units_of_rotations() -> None:
     pytest.importorskip("textual", reason="the full screen needs the extra 'debug'")
@@ -182,6 +182,7 @@ def test_pictures_of_rotations_have_units_of_rotations() -> None:
 
 
 # --------------------------------------------------------------------------- fits
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_fit_of_a_joint_has_units_of_rotations(tmp_path: Path) -> None:
     friction = LuGre(sigma_0=100.0, sigma_1=0.5, sigma_2=0.1, stribeck=Stribeck(1.0, 1.5, 0.05))

@@ -130,6 +130,7 @@ def test_without_figures_nothing_is_drawn(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 # --------------------------------------------------------------------------- the tribometer
+@pytest.mark.matrix
 def test_the_tribometer_explains_the_measurement_and_shows_its_loops(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -123,6 +123,7 @@ def test_the_live_table_shows_no_ratio(model: ChartModel) -> None:
     assert "nan" not in said
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_pictures(trace: Trace, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="needs matplotlib (extra: plots)")

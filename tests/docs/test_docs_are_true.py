@@ -34,8 +34,10 @@ PAGES = [
 # Long runs: `make foreign` runs these pages, `make test` all others.
 LONG = (
     *("bouc-wen.md", "elasto-plastic.md", "lugre-sigma1.md", "seven-parameter.md"),
-    *("choose.md", "compensation.md", "coverage.md", "exporting-figures.md", "exports.md"),
-    *("own-loops-mujoco.md", "own-loops-scipy.md", "robot-joint.md", "servo.md"),
+    *("add-a-model.md", "choose.md", "compensation.md", "coverage.md", "exporting-figures.md"),
+    *("exports.md", "gradients.md", "known-systems.md", "measured-record.md", "own-loops.md"),
+    *("own-loops-mujoco.md", "own-loops-scipy.md", "own-rig.md", "playing.md", "robot-joint.md"),
+    *("servo.md", "sweeps.md"),
 )
 FIGURES = "exporting-figures.md"  # draws each format; tests/plots draws each figure
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))

@@ -76,6 +76,7 @@ def test_the_strict_build_passes_and_pages_load_nothing_external(built: Built) -
         assert not [address for address in loaded if outside(address)], style.name
 
 
+@pytest.mark.matrix
 def test_a_lesson_is_run_and_its_predictions_are_answered(built: Built) -> None:
     """The first; `make docs` runs them all."""
     assert built.code == 0, built.said

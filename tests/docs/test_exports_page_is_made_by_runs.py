@@ -62,7 +62,7 @@ def test_a_page_without_the_marks_is_refused(script: ModuleType) -> None:
         script.filled("# A page\n", "")
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_each_format_has_a_section_whose_command_runs(name: str, gms_fsm: CommandLine) -> None:

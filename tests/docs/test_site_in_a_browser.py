@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from tests.docs.conftest import Built
-from tests.helpers import ROOT, matrix
+from tests.helpers import ROOT
 from tests.plots.browser import Browser, Page, browser, expect, faults
 
 __all__ = ["browser"]
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.matrix,  # building the site takes a minute
     pytest.mark.skipif(
         importlib.util.find_spec("furo") is None or importlib.util.find_spec("nbclient") is None,
         reason="building the site needs the extra 'docs'",
@@ -24,11 +24,6 @@ pytestmark = [
 ]
 
 SIZES = {400: 850, 800: 1000, 1366: 768, 1920: 1080}
-# In `make test` axe reads each of the pages once; at the other sizes, `make foreign`, all of them.
-ONCE = {
-    (400, "light"): ("gallery.html", "zoo/lugre.html"),
-    (1366, "dark"): ("index.html", "play.html"),
-}
 LIVE = (
     "pulled_mass",
     "paper_fig4_stick_slip",
@@ -74,9 +69,7 @@ def alive(page: Page) -> None:
 
 
 # --------------------------------------------------------------------------- the first page
-@pytest.mark.parametrize(
-    ("width", "scheme"), matrix([(400, "light"), (1366, "dark")], [(1366, "dark")])
-)
+@pytest.mark.parametrize(("width", "scheme"), [(400, "light"), (1366, "dark")])
 def test_the_replay_is_alive_walks_by_keys_and_has_the_theme_of_the_site(
     visit: Visit, width: int, scheme: str
 ) -> None:
@@ -172,12 +165,8 @@ def test_dark_pictures_lie_on_the_dark_ground_and_keep_their_hues(built: Built) 
 
 
 # --------------------------------------------------------------------------- for everybody
-@pytest.mark.matrix
 @pytest.mark.parametrize(
-    ("width", "scheme"),
-    matrix(
-        [(width, "light") for width in SIZES] + [(1366, "dark")], [(400, "light"), (1366, "dark")]
-    ),
+    ("width", "scheme"), [(width, "light") for width in SIZES] + [(1366, "dark")]
 )
 def test_axe_finds_nothing_and_nothing_is_wider_than_the_screen(
     visit: Visit, width: int, scheme: str
@@ -187,7 +176,5 @@ def test_axe_finds_nothing_and_nothing_is_wider_than_the_screen(
         if name == "index.html":
             alive(page)
         assert page.evaluate("document.documentElement.scrollWidth") <= width, name
-        if name not in ONCE.get((width, scheme), (name,)):
-            continue
         # Only this document: axe would fetch style sheets, and the replay page has its own test.
         assert faults(page, options={"preload": False, "iframes": False}) == [], name

@@ -81,6 +81,7 @@ def test_every_chart_is_in_it() -> None:
     assert missing == [], AGAIN
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_three_models_measured_again() -> None:
     fresh = measure_phenomena(["lugre", "gms-signed", "stiction"]).markdown().splitlines()

@@ -96,6 +96,7 @@ def test_no_page_says_so_elsewhere() -> None:
     assert said == []
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_the_opposite_runs() -> None:
     """The same calls without what is not supported."""

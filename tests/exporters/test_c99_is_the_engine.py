@@ -96,6 +96,7 @@ def in_python(given: GMS | ChartModel) -> list[float]:
     return [friction.advance(v0, v1, 0.1) for v0, v1 in PAIRS]
 
 
+@pytest.mark.matrix
 def test_the_engine_in_a_struct(c: Library) -> None:
     first, copied = c.begun(), c.State()
     begun = forces(c, first)
@@ -167,6 +168,7 @@ def test_numbers_are_set_and_all_that_follows_from_them(c: Library) -> None:
         assert c.set(state, place, value) == -1
 
 
+@pytest.mark.matrix
 def test_the_entry_of_the_default_state_follows_a_number(tmp_path: Path) -> None:
     entry = {"z": "2.0 * z_0 + sgn(tau - 2.0)"}
     chart = Chart(
@@ -226,6 +228,7 @@ def test_a_broken_record_is_named(tmp_path: Path) -> None:
         assert said in done.stderr
 
 
+@pytest.mark.matrix
 def test_no_name_is_one_of_the_c_library(tmp_path: Path) -> None:
     """Without -std=c99 its headers declare more of them: finite, gamma, j0 and others."""
     export(stick_slip("signed"), "c99", tmp_path, name="it")
@@ -233,6 +236,7 @@ def test_no_name_is_one_of_the_c_library(tmp_path: Path) -> None:
     subprocess.run(command, cwd=tmp_path, check=True)
 
 
+@pytest.mark.matrix
 def test_settings_are_those_of_the_engine(tmp_path: Path) -> None:
     sources = set()
     for settings in (Settings(), Settings(method="rk4", step=1e-3), Settings(atol=1e-12)):

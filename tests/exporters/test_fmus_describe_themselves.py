@@ -88,6 +88,7 @@ def test_the_variables_of_a_friction(form: str) -> None:
     assert "break_away_forward, arrest" in margins["margin.break_away_forward_2"]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("form", FORMATS)
 def test_the_variables_of_a_system(form: str) -> None:
     found = archive(servo(), form).variables()
@@ -99,6 +100,7 @@ def test_the_variables_of_a_system(form: str) -> None:
     assert "bearing.margin.break_away_forward[1]" in found
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("form", FORMATS)
 def test_an_event_has_its_own_name_where_it_is_free_and_a_supervisor_no_bristle(form: str) -> None:
     system = crossing().system

@@ -208,6 +208,7 @@ def document_of(nested: Nested) -> str:
     return f"{head}<datamodel>{data}</datamodel>{''.join(map(state, nested.tops))}</scxml>"
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_random_nested_documents(tmp_path: Path) -> None:
     from statemachine.io import load

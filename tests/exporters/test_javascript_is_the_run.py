@@ -94,6 +94,7 @@ def test_events_and_conditions_that_last_have_the_same_bits(tmp_path: Path) -> N
         assert len(same(Case(name, each, 2.0, {}), tmp_path / name).transitions) > 5
 
 
+@pytest.mark.matrix
 def test_columns_grow(tmp_path: Path) -> None:
     case = dataclasses.replace(scenario(SCENARIOS / "pulled_mass.toml"), t_end=6.0)
     trace = same(case, tmp_path)
@@ -101,6 +102,7 @@ def test_columns_grow(tmp_path: Path) -> None:
     assert len(trace.transitions) > 256
 
 
+@pytest.mark.matrix
 def test_tolerances_follow_the_numbers_and_another_run_is_noticed(tmp_path: Path) -> None:
     case, numbers = Case("pulled", pulled(), 5.0, {}), "{ pad_F_s: 3, pad_v_s: 0.01, m: 0.2 }"
     model = stick_slip("signed")
@@ -196,6 +198,7 @@ def bank(k: float) -> GMS:
     return GMS(GMSParameters([k, 0.9], [0.3, 0.4], [0.1, 0.05], **more), law="signed")
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("model", [bank, winding])
 def test_one_friction_is_stepped_as_in_python(model: Any, tmp_path: Path) -> None:
     found, friction = stepped(tmp_path, model(0.7), "{ k: [7, 0.9] }"), FrictionState(model(7.0))

@@ -165,6 +165,7 @@ def test_what_a_format_cannot_express(
     assert word in error.reason
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_an_engine_without_a_plain_form_says_why(tmp_path: Path) -> None:
     files = export(ChartModel(READS_F, {}), "c99", tmp_path, name="it")
@@ -203,6 +204,7 @@ def test_a_chart_named_like_a_path(form: str, name: str, tmp_path: Path) -> None
     assert "another name" in said
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_what_is_not_ours_stays(tmp_path: Path) -> None:
     for name in [path.name for path in export(PAPER, "transitions", tmp_path / "a", name="it")]:

@@ -75,7 +75,7 @@ def case(name: str) -> Case:
     return model(name), *record, switches
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*CASES, *matrix([*MODELS], ["gms-signed", "seven-parameter"])])
 def test_every_switch_and_the_force_are_equal(name: str, tmp_path: Path) -> None:

@@ -132,6 +132,7 @@ def test_forces_outside_the_training_rows_are_not_read_and_numbers_given_are_kep
     assert (one.law, one.parameters.v_c) == ("published", 3e-6)
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 15])
 def test_a_bank_of_the_tribometer_explains_its_training_rows(n: int) -> None:

@@ -136,6 +136,7 @@ def test_the_simplest_kind_is_found_leaving_records_out() -> None:
     assert found.choice.chosen == "1"  # two fit as well, with more unknowns
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_candidate_that_fails_is_noted_and_an_interrupt_keeps_those_compared() -> None:
     pytest.importorskip("llvmlite", reason="fits take long without machine code")

@@ -97,6 +97,7 @@ def condition(t: np.ndarray, v: np.ndarray) -> float:
     return float(singular[0] / singular[-1])
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_all_elements_slip_and_it_is_better_conditioned_than_a_sine() -> None:
     motion = excite(STROKE, SPEEDS, rate=100.0)

@@ -55,6 +55,7 @@ def test_a_proposal_costs_its_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     assert lost > 0, "no proposal was ever lost, so this tested nothing"
 
 
+@pytest.mark.matrix
 def test_what_ran_in_the_search_runs_at_the_end_or_it_is_said(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -157,6 +157,7 @@ def test_a_choice_does_not_see_the_motion_after_the_training() -> None:
     assert [each.value for each in one.table] == [each.value for each in two.table]
 
 
+@pytest.mark.matrix
 def test_a_record_that_begins_in_motion_runs_in() -> None:
     late = rubbed(12.0).between(9.3, 24.0)  # in the middle of a stroke, all elements deflected
     found = fitted(late)
@@ -204,6 +205,7 @@ def test_all_of_an_element_moves_with_it() -> None:
     assert found.model.values["C"].tolist() == [2e-3, 1e-3]  # type: ignore[union-attr]
 
 
+@pytest.mark.matrix
 def test_bounds_of_stiction_hold_while_friction_is_free() -> None:
     truth = LuGre(sigma_0=4e4, sigma_1=0.0, sigma_2=0.0, stribeck=Stribeck(2.0, 2.1, 1e-3))
     record = measured(truth, sine(3e-4, 2.0, 4.0))

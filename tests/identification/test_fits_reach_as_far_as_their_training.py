@@ -132,7 +132,7 @@ def test_a_play_bank_is_found_without_a_search() -> None:
     assert len(bank.used) <= 4
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("smoothing", [0.0, 0.002, 0.005, 0.01, 0.02])
 def test_an_inertia_under_a_smoothing_is_covered_or_doubted(smoothing: float) -> None:
     t = np.arange(1000) * 0.005

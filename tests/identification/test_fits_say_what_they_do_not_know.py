@@ -86,6 +86,7 @@ def test_profiles_stay_within_bounds() -> None:
     assert profile.rise.min() == 0.0
 
 
+@pytest.mark.matrix
 def test_a_parameter_of_either_sign_has_a_profile() -> None:
     on = State("on", flow={"z": "v"}, outputs={"F": "k * z + b * v"})
     model = ChartModel(Chart("spring", ("v",), ("z",), ("k", "b"), (on,)), {"k": -1e4, "b": 0.0})
@@ -98,6 +99,7 @@ def test_a_parameter_of_either_sign_has_a_profile() -> None:
         assert profile.high == pytest.approx(found[name].high, rel=0.1, abs=0.2)
 
 
+@pytest.mark.matrix
 def test_of_a_product_alone_nothing_is_told() -> None:
     on = State("on", flow={"z": "v"}, outputs={"F": "k * b * z"})
     model = ChartModel(Chart("spring", ("v",), ("z",), ("k", "b"), (on,)), {"k": 100.0, "b": 100.0})
@@ -126,6 +128,7 @@ def test_a_slope_is_taken_on_the_side_that_runs() -> None:
     assert not slopes(0, 1e3).any(), "no side runs, so nothing is known"
 
 
+@pytest.mark.matrix
 def test_the_stribeck_exponent_is_searched_across_two() -> None:
     """An exponent of 2 gives another text of the curve, and so another program."""
     record = measured(bank([2e4], [5e-5], F_s=1.5), sine(4e-4, 2.0, 4.0), 0.005, 4)

@@ -60,6 +60,7 @@ def test_loads_that_differ_are_not_shared_in_silence() -> None:
         fit(records, model, free=["mu"])
 
 
+@pytest.mark.matrix
 def test_what_no_contact_reads_is_noted() -> None:
     model = ChartModel(joint_chart("plain", "F_0", []), {"sigma_0": 4e4, "b": 5.0, "F_0": 3.0})
     found = fit(loaded(20.0), model, free=["b"], search="local")
@@ -72,6 +73,7 @@ def test_candidates_are_those_whose_inputs_are_given() -> None:
     assert not {"load and temperature", "directional load (M5)", "gear loss"} & names
 
 
+@pytest.mark.matrix
 def test_choose_says_why_the_others_lost() -> None:
     records = [loaded(n) for n in (20.0, 60.0, 130.0)]
     some = [each for each in JOINTS if each.name in ("load (M3)", "Coulomb, viscous (M1)")]
@@ -95,6 +97,7 @@ def test_a_force_without_a_memory_needs_no_state_and_a_score_needs_rows():
         found.score(record, "estimate", lead=9.0)
 
 
+@pytest.mark.matrix
 def test_an_estimated_state_is_found_where_two_elements_share_the_force():
     model = ChartModel(CHARTS["maxwell-slip"], {"k": [4e4, 2e4], "F_c": [0.5, 1.0]}, n=2)
     t = np.arange(0.0, 4.0, 0.01)

@@ -269,6 +269,7 @@ def test_a_run_that_was_pickled_says_the_same():
     assert {each.kind for each in trace.trust()} <= {*KINDS}
 
 
+@pytest.mark.matrix
 def test_trust_of_one_contact_is_its_part_of_the_whole():
     trace = load_scenario("ball_screw_table").simulate()
     whole = trace.trust()

@@ -61,6 +61,7 @@ def test_a_poke_changes_what_it_names() -> None:
     assert session.back() == before
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_branches_of_branches_have_the_pasts_of_all() -> None:
     session = fig4()

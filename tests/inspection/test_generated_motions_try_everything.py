@@ -37,7 +37,7 @@ def backlash() -> Generated:
     return generate(charts()["backlash"])
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SOME)
 def test_every_edge_every_pair_and_every_comparison_is_tried(name: str) -> None:

@@ -262,6 +262,7 @@ def test_charts_without_impacts_are_not_asked() -> None:
 
 
 # --------------------------------------------------------------------------- at random
+@pytest.mark.every(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("index", range(15))
 def test_random_systems_do_not_contradict_their_verdicts(index: int) -> None:

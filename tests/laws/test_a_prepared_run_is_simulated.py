@@ -52,7 +52,7 @@ def repeated(ready: Prepared, numbers: dict[str, Any]) -> tuple[Trace | None, st
         return getattr(error, "trace", None), f"{type(error).__name__}: {error}"
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @each([*CORPUS, *FAILING], {*FEW, *QUICK, *[*FAILING][::4]})
 def test_every_number_can_be_changed(name: str) -> None:
     one = run(name)
@@ -124,6 +124,7 @@ def test_an_exponent_of_two_is_another_program_from_either_side() -> None:
     assert other_parts(ready(delta=2.0), simulate(*PULLED, 20.0, engine=FASTEST)) == []
 
 
+@pytest.mark.matrix
 def test_calls_between_further_functions_arrive() -> None:
     """Both objects of this one have a table of offsets; LLVM would mix the two up."""
     z_c = 0.1 * np.arange(1, 8)

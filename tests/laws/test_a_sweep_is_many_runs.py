@@ -83,7 +83,7 @@ def test_each_row_is_a_run(name: str, tmp_path: Path) -> None:
     same(Sweep.load(found.save(tmp_path / "runs.npz")), found)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @each(FAILING)
 def test_a_failure_is_the_outcome_of_its_run(name: str) -> None:
     what, one = mounted(*run(name).subject), run(name)

@@ -39,7 +39,7 @@ def switches(one: Trace, contact: str) -> list[tuple[int, str]]:
     return [(int(row.element), str(row.edge)) for row in log]
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DECLARED)
 def test_the_opposite_order(name: str) -> None:

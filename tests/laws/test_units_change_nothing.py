@@ -41,7 +41,7 @@ def in_units(name: str, **by: float) -> list[str]:
     return other_bits(there, here, **by)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @each(RIG_RUNS, KINDS)
 def test_every_run_on_a_shipped_rig(name: str) -> None:
     """Each in one other unit, in turn."""

@@ -66,10 +66,13 @@ GUESSED: dict[int, tuple[float | str, ...]] = {
     13: (220, 150, "same"),
 }
 Ran = Callable[[int], Result]
-SLOW = sorted({*LESSONS} - {0, 1, 9})
 each_lesson = pytest.mark.parametrize(
     "number",
-    [0, 1, 9, *(pytest.param(number, marks=pytest.mark.slow) for number in SLOW)],
+    [
+        *(0, 1, 9),
+        *(pytest.param(number, marks=pytest.mark.slow) for number in (6, 10, 13)),
+        *(pytest.param(n, marks=pytest.mark.matrix) for n in (2, 3, 4, 5, 7, 8, 11, 12)),
+    ],
     scope="module",  # tests of a lesson follow each other, so that one worker runs it
 )
 
@@ -101,6 +104,7 @@ def test_the_five_lines_say_what_was_measured(ran: Ran, number: int) -> None:
         assert line.startswith("Measured")
 
 
+@pytest.mark.every(3)
 @each_lesson
 def test_readers_predict_before_the_run_and_compare_after_it(
     ran: Ran, number: int, capsys: pytest.CaptureFixture[str]

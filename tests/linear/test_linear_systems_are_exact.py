@@ -66,6 +66,7 @@ def test_sticking_elements_are_one_spring() -> None:
     np.testing.assert_array_equal(found.D, np.zeros((5, 1)))
 
 
+@pytest.mark.matrix
 def test_states_and_outputs_have_the_names_of_values() -> None:
     plant = replace(load_scenario("servo").system, sampled=(), inputs=("u",))
     two = replace(plant, contacts=(*plant.contacts, Contact("seal", bank(), v="v_m")))
@@ -75,6 +76,7 @@ def test_states_and_outputs_have_the_names_of_values() -> None:
         assert {*found.states, *found.outputs} <= {*SystemState(system).names}
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("force", "t", "states"),
     [("0.5*min(t, 1)", 3.0, "stick"), ("2.5*min(t, 1)", 3.0, "slip")],

@@ -30,6 +30,7 @@ def hub(n: int) -> Chart:
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_engines_agree_where_branches_are_halved() -> None:
     model, rig = ChartModel(hub(60), {"k": 1.0}), Prescribed("t")

@@ -21,6 +21,7 @@ FLOWS = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_calls_that_turn_together_are_each_computed(engine: str) -> None:

@@ -134,6 +134,7 @@ def test_the_switches_are_those_of_simulate(
     assert said(lines) == log_of(trace)
 
 
+@pytest.mark.matrix
 def test_a_servo_with_a_controller_and_two_contacts(gms_fsm: CommandLine) -> None:
     loaded = load_scenario("servo")
     path = printed(gms_fsm, str(ROOT / "gms_fsm/scenarios" / "servo.toml"))

@@ -62,6 +62,7 @@ def _on_bench(phenomenon: str, force: str, flow: str = "v") -> PhenomenonResult:
     return measure_phenomena({"own": model}, [phenomenon]).cell("own", phenomenon)
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_what_is_hardly_friction_is_told_apart() -> None:
     """A thin oil slides at any force, a soft spring is not released, an echo comes too late."""

@@ -125,6 +125,7 @@ def compared(table: PhenomenaTable, factor: float = 1.0) -> None:
             assert scale * a.value == pytest.approx(b.value, rel=2e-3, abs=1e-3), where
 
 
+@pytest.mark.matrix
 def test_a_finer_tolerance_changes_nothing() -> None:
     compared(measure_phenomena(["lugre", "stiction"], bench=Bench(rtol=1e-10)))
 

@@ -85,6 +85,7 @@ def test_numbers_of_a_column_have_the_same_decimals(table: PhenomenaTable) -> No
         assert len(forms) == 1, cells
 
 
+@pytest.mark.matrix
 def test_what_slides_away_has_no_number_in_the_table() -> None:
     away = measure_phenomena(["rate-state-slip"], ["hysteresis"])
     found = away.cell("rate-state-slip", "hysteresis")

@@ -30,6 +30,7 @@ def ran(flow: str, t_end: float = 4.0) -> Trace:
 DUTY = 8 * 0.2, 5 * 0.2  # of the two elements, in 4 s
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("flow", "expected"),
     [

@@ -125,6 +125,7 @@ def test_a_brake_begins_to_squeal_with_the_frequency_of_its_coupled_modes() -> N
 
 
 # --------------------------------------------------------------------------- thresholds
+@pytest.mark.matrix
 def test_a_fault_fails_again_and_again_below_the_critical_stiffness() -> None:
     """Ruina's critical stiffness is N (b - a) / D_c = 1.2e7 N/m."""
     rock = load_scenario("earthquake")
@@ -166,6 +167,7 @@ def test_a_door_holds_up_to_the_angle_at_which_its_weight_exceeds_the_friction()
 
 
 # --------------------------------------------------------------------------- live pages
+@pytest.mark.matrix
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_a_known_system_is_a_live_page_unless_scipy_runs_it(

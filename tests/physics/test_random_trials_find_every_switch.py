@@ -56,6 +56,7 @@ def test_what_relaxes_does_not_wander_across_its_threshold(key: tuple[str, int, 
     assert run(one).sequence == exact.sequence
 
 
+@pytest.mark.matrix
 def test_the_judge_finds_a_coarse_run_but_no_switch_at_the_very_end() -> None:
     """At rtol 1e-2 runs are wrong; if a billionth of t_end decides, no solver is to blame."""
     found = [judge(trial("pulled", 14, index), rtol=1e-2, atol=1e-3) for index in range(COUNT)]
@@ -89,6 +90,7 @@ def agrees(one: Trial) -> None:
     np.testing.assert_allclose(exact.end, [seen.x, seen.v, *seen.z], rtol=1e-5, atol=1e3 * one.atol)
 
 
+@pytest.mark.matrix
 def test_the_witness_has_a_carriage_that_never_breaks_away() -> None:
     seen = witness(CARRIAGE.model, CARRIAGE.rig, CARRIAGE.t_end)
     assert seen.transitions == []

@@ -20,7 +20,7 @@ from gms_fsm.systems.numbers import numbers_of, with_elements, with_law
 from plots.page._rows import PageRows
 from plots.page._run import stored_run, views_of
 from plots.page.live import play
-from tests.helpers import FASTEST
+from tests.helpers import FASTEST, matrix
 from tests.plots.browser import SIZES, Open, browser, faults, open_page, said, wait
 from tests.plots.live_pages import FOUND, differing, live_scenario
 from tests.plots.stored import column
@@ -78,7 +78,9 @@ def turned(page: Any, numbers: dict[str, float]) -> None:
     wait(page, "!frameAsked && !live.busy")
 
 
-@pytest.mark.parametrize("name", ["pulled_mass", "servo", "ball_screw_table"])
+@pytest.mark.parametrize(
+    "name", matrix(["pulled_mass", "servo", "ball_screw_table"], ["pulled_mass", "servo"])
+)
 def test_its_floats_are_those_of_python(live: Any, name: str) -> None:
     scenario, page = live_scenario(name), live(name)
     sets = scenario.sets(4, page.evaluate("Object.keys(variant().engine)"))
@@ -88,7 +90,9 @@ def test_its_floats_are_those_of_python(live: Any, name: str) -> None:
         assert count > 1000
 
 
-@pytest.mark.parametrize("name", ["pulled_mass", "servo", "two_blocks_on_a_belt"])
+@pytest.mark.parametrize(
+    "name", matrix(["pulled_mass", "servo", "two_blocks_on_a_belt"], ["servo"])
+)
 def test_its_columns_are_those_that_a_replay_page_stores(live: Any, name: str) -> None:
     scenario, page = live_scenario(name), live(name)
     (numbers,) = scenario.sets(1, page.evaluate("Object.keys(variant().engine)"), seed=4)
@@ -187,7 +191,7 @@ def test_an_address_has_the_state_exactly(live: Any) -> None:
     assert refused == "not taken from the address: nothing=3; F_s must be at least F_c, 1"
 
 
-@pytest.mark.parametrize("name", ["pulled_mass", "ball_screw_table"])
+@pytest.mark.parametrize("name", matrix(["pulled_mass", "ball_screw_table"], ["pulled_mass"]))
 def test_the_scenario_of_a_page_is_its_run(live: Any, name: str, tmp_path: Path) -> None:
     scenario, page = live_scenario(name), live(name)
     (numbers,) = scenario.sets(1, page.evaluate("Object.keys(variant().engine)"), seed=2)
@@ -372,6 +376,7 @@ def test_numbers_in_guards_are_changed_as_parameters_are(open_page: Open, tmp_pa
         assert count > 1000
 
 
+@pytest.mark.matrix
 def test_a_sweep_of_another_contact_has_its_quantities(live: Any) -> None:
     page = live("ball_screw_table", tab="Sweep")
     page.locator("select.contact").select_option("guide")

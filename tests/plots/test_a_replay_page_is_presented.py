@@ -69,6 +69,7 @@ def told(page: Any) -> str:
     return str(page.locator("#notes").inner_text())
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("name", "scheme", "size"),
     [("mass", "light", PROJECTORS[0]), ("blocks", "dark", PROJECTORS[1])],

@@ -759,6 +759,7 @@ def first_to_fire(trace: Trace, row: int, element: int, state: str, v: float, z:
 
 
 # A plane of v and z, of v and F, and with named expressions.
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", ["signed", "karnopp", "elasto-plastic"])
 def test_regions_have_the_truths_of_the_run_and_a_dragged_dot_says_what_would_fire(
     open_page: Open, name: str

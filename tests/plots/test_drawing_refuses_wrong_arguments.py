@@ -135,6 +135,7 @@ REFUSED: list[tuple[str, Call, str, list[Any]]] = [
 SLOW = ("fit", "profiles", "landscape")
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("call", "argument", "wrongs"),
     [

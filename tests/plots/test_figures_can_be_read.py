@@ -227,7 +227,7 @@ EVERY = [
 ]
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("name", "preset"), matrix(EVERY, PRINTED))
 def test_texts_can_be_read_in_print(name: str, preset: str) -> None:
     with plots.preset(preset) as sizes:
@@ -247,6 +247,7 @@ MANY = {*FIGURES, "unfold"} - {"schematic"}
 MORE = [*itertools.product(sorted(MANY), (4, 12, 20)), ("cascade", 1)]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("shown", "n"), matrix(MORE, SIZES))
 def test_texts_have_room_for_many_elements_and_colours_are_roles(shown: str, n: int) -> None:
     figure = on_screen(shown, n)
@@ -315,6 +316,7 @@ def test_every_figure_takes_every_run(name: str, kind: str, tmp_path: Path) -> N
     assert all("[" in label for label in labels if label and label != bar), labels
 
 
+@pytest.mark.matrix
 def test_the_same_run_gives_the_same_file_and_fonts_of_a_pdf_are_truetype(tmp_path: Path) -> None:
     texts = []
     for name in "ab":
@@ -355,6 +357,7 @@ def test_ribbons_figure_has_the_columns_of_the_run() -> None:
     assert len(titles(run("LuGre"), around=2.0)) == 8
 
 
+@pytest.mark.matrix
 def test_window_and_elements_reach_every_panel() -> None:
     signed = run("published")
     figure = figures.ribbons_figure(signed, 20.14, window=(10.0, 30.0), elements=[0, 3])
@@ -437,6 +440,7 @@ def test_a_measurement_is_shown_with_the_model() -> None:
 
 
 # --------------------------------------------------------------------------- presets
+@pytest.mark.matrix
 def test_presets_have_the_sizes_of_the_journal_or_ones_own_and_end_with_their_context() -> None:
     sizes = {name: (each.width, each.smallest) for name, each in PRESETS.items()}
     assert sizes["ieee1"] == (3.5, 7.0)  # 88.9 mm
@@ -453,6 +457,7 @@ def test_presets_have_the_sizes_of_the_journal_or_ones_own_and_end_with_their_co
     assert presets.current() is PRESETS["screen"]
 
 
+@pytest.mark.matrix
 def test_what_is_low_or_has_many_elements_is_drawn_otherwise() -> None:
     trace = simulate(stick_slip("signed"), Prescribed(FIG4_SINE), 20.0)
     with presets.preset(Preset("low", None, 2.2, 9.0, 7.0, 1.0, 100.0)):

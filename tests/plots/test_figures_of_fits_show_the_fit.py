@@ -178,6 +178,7 @@ def test_a_better_fit_the_fitted_value_and_a_single_value_are_inside() -> None:
     assert problems(figure_of(one), SCREEN.smallest) == []
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("count", "columns"), [(3, 3), (14, 4)])
 def test_profiles_have_room(count: int, columns: int) -> None:
     figure: Any = profiles_figure(with_profiles(count))

@@ -40,6 +40,7 @@ LABEL = re.compile(r"E\d+ (stick|slip)")  # of a bristle
 WINDOW = {"t_start": 3.3, "t_end": 5.0, "frames": 60}  # four micro-steps
 
 
+@pytest.mark.matrix
 def test_the_fired_edge_is_lit_and_fades(tmp_path: Path) -> None:
     """Beside the cursor, nothing but the edge, its contact and the number is orange."""
     orange = CHART_THEMES["dark"].fired
@@ -157,7 +158,7 @@ def mounted(found: Entry, law: str) -> tuple[Any, ...]:
 TENTH = {*every()[::10], ("planar-coulomb", "")}
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(6)
 @pytest.mark.parametrize(("name", "law"), matrix(every(), TENTH))
 def test_every_chart_has_a_film(name: str, law: str, tmp_path: Path) -> None:
     try:

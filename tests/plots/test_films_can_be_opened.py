@@ -59,6 +59,7 @@ def test_a_gif_shows_the_frames_for_the_right_time(
         assert count(shown, CHART_THEMES["light"].paper) > 0.5 * shown.size[0] * shown.size[1]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("ending", VIDEOS)
 def test_a_video_shows_the_frames_for_the_right_time(
     ending: str, wanted: list[Image.Image], tmp_path: Path
@@ -115,6 +116,7 @@ def test_frames_have_the_theme_one_layout_the_active_states_and_the_cursor(
         assert count(picture, colours.fired) > 50  # the cursor
 
 
+@pytest.mark.matrix
 def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "run.gif"
     path.write_bytes(b"the film of yesterday")

@@ -59,7 +59,7 @@ def checked(model: Model) -> set[str]:
 KEPT = {*ZOO[::9], ("modelica", "")}
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "law"), matrix(ZOO, KEPT))
 def test_charts_of_the_zoo(name: str, law: str) -> None:
@@ -93,6 +93,7 @@ def test_the_file_has_one_page_of_a4(tmp_path: Path) -> None:
     assert b"/Subtype /Image" not in content
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_at_the_command_line_also_of_a_contact_of_a_system(gms_fsm: CommandLine) -> None:
     assert gms_fsm("handout", "maxwell-slip", "-o", "a.svg").out == "a.svg\n"

@@ -35,6 +35,7 @@ def test_of_a_joint_there_are_units_of_rotations_only(open_page: Open, tmp_path:
     assert units_in(said, TORQUE) >= {"rad", "rad/s", "Nm"}
 
 
+@pytest.mark.matrix
 def test_of_a_ball_screw_each_contact_has_its_own(open_page: Open, tmp_path: Path) -> None:
     run = load_scenario("ball_screw_table", ["run.t_end=1.2"]).simulate()
     for name, own, other in (("bearing", TORQUE, MASS), ("guide", MASS, TORQUE)):

@@ -383,6 +383,7 @@ def test_the_dot_is_at_the_row_and_both_panels_have_one_colour_bar(once: Trace) 
 
 
 # --------------------------------------------------------------------------- contacts of systems
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_every_figure_takes_a_contact() -> None:
     trace = system_run(BLOCKS).contact("pad2")

@@ -52,6 +52,7 @@ def hide(patch: pytest.MonkeyPatch, *what: str) -> None:
         patch.setitem(sys.modules, "pygraphviz", None)
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "hidden", [pytest.param("package", marks=needs_dot), "program"], ids=["dot", "pygraphviz"]

@@ -193,6 +193,7 @@ def test_as_c99_it_has_the_same_bits(tmp_path: Path) -> None:
     assert 0 < limited < 400
 
 
+@pytest.mark.matrix
 @needs_c
 @pytest.mark.slow
 def test_as_c99_inputs_and_no_feedback(tmp_path: Path) -> None:

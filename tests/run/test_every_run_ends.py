@@ -181,6 +181,7 @@ def stiff(C: float) -> GMS:
     return GMS(parameters, law="signed")
 
 
+@pytest.mark.every(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("output", [{}, {"output": "end"}, {"t_eval": [5.0]}])
 @pytest.mark.parametrize("engine", BOTH)
@@ -243,6 +244,7 @@ def test_a_run_that_is_stiff_at_first_and_then_rests_ends(C: float, output: Any)
     assert len(trace.transitions) == 120
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_ticks_do_not_count_as_steps() -> None:
     """500,000 ticks take a million steps, which is the default limit."""

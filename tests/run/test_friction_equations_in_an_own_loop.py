@@ -58,6 +58,7 @@ def _own_loop(friction: FrictionEquations, t_end: float, method: Any) -> list[An
     return switches
 
 
+@pytest.mark.every(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(("method", "error"), [("RK45", 1e-4), ("Radau", 1e-5), ("LSODA", 5e-4)])
 def test_72_of_72(method: str, error: float) -> None:

@@ -73,6 +73,7 @@ def known(friction: Any) -> tuple[Any, ...]:
 
 
 # --------------------------------------------------------------------------- forward and back
+@pytest.mark.every(2)
 @pytest.mark.slow
 @made
 @engines
@@ -129,6 +130,7 @@ def test_copies_go_their_own_ways(kind: str, again: Callable[[Any], Any]) -> Non
     assert moved(other, 60, 200) == first
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("seed", range(6))
 def test_an_array_with_one_number_changed_is_refused_or_runs(seed: int) -> None:
     """Whatever a host does to the numbers, machine code never uses them as wrong addresses."""

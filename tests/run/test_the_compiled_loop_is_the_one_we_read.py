@@ -191,6 +191,7 @@ FUNCTIONS = [
 ]  # fmt: skip
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("text", FUNCTIONS)
 def test_every_function_at_many_places(text: str) -> None:
     """Compilers turn 8**z into exp2 and z**0.5 into sqrt, which differ in the last bits."""

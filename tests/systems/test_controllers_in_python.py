@@ -60,6 +60,7 @@ def controlled(function: Any, **more: Any) -> System:
     return sled(Sampled("pd", period=0.1, updates=function, outputs=("u",)), **more)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("engine", sorted({"ifelse", FASTEST}))
 @pytest.mark.parametrize("r", ["sin(t)", ([0.0, 1.05, 3.0], [0.0, 1.0, -1.0])])
 def test_it_sees_what_the_run_has_at_its_ticks(engine: str, r: Any) -> None:

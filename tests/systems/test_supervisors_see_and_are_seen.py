@@ -318,6 +318,7 @@ def test_each_supervisor_can_be_proved_alone_and_in_its_system():
     assert [each.check for each in found] == ["livelock"]  # low > high is not excluded
 
 
+@pytest.mark.matrix
 def test_a_sweep_varies_a_system_with_supervisors():
     case = hot_brake()
     result = sweep(case.system, case.t_end, {"pad.mu": [0.3, 0.4]}, engine=FASTEST, rtol=1e-10)
@@ -335,6 +336,7 @@ def test_an_input_that_reads_the_force_that_it_makes_is_refused():
         )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("make", [hot_brake, thermostat])
 def test_the_command_line_runs_checks_and_exports_supervisors(gms_fsm: CommandLine, make):
     for module in ("z3", "matplotlib"):
@@ -437,6 +439,7 @@ def test_a_session_steps_through_a_supervisor():
     assert session.why("heater 1")[0].edge.name == "switch_off"
 
 
+@pytest.mark.matrix
 def test_a_sweep_has_no_columns_for_a_motion_that_there_is_not():
     found = sweep(thermostat().system, 3.0, {"heater.low": [18.0, 19.0]}, engine=FASTEST)
     names = ["heater.low", "outcome", "message", "t", "T", "heater.state1", "transitions"]

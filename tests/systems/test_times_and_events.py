@@ -48,6 +48,7 @@ def begins_like(part: Trace, whole: Trace) -> None:
 
 
 # --------------------------------------------------------------------------- until
+@pytest.mark.every(2)
 @pytest.mark.parametrize("engine", [FASTEST, "machines"])
 @pytest.mark.parametrize(
     ("text", "value"),

@@ -305,7 +305,7 @@ LOOPS: dict[str, tuple[Callable[[], Trace], Callable[[], list[Switch]], int]] = 
 }
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_the_switches_are_those_on_paper(name: str) -> None:

@@ -168,6 +168,7 @@ def test_radau_with_absolute_tolerances_follows_a_stiff_run(name: str, law: str)
     assert trace.v[-1] == pytest.approx(wanted.y[1, -1], rel=1e-3)
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_an_explicit_run_that_is_stiff_names_the_method_and_its_tolerances() -> None:
     rig = PulledSlider(1.0, 2.0, 0.1)
