@@ -108,7 +108,8 @@ def test_ctrl_c_keeps_the_best_so_far(
     gms_fsm: CommandLine, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said = "The search was interrupted: this is the best so far."
-    monkeypatch.setattr(fit, "fitted", lambda *_, **__: replace(small(), stopped=said))
+    stopped = replace(small(), stopped=said)
+    monkeypatch.setattr(fit, "fitted", lambda *_, **__: stopped)
     done = gms_fsm("fit", scenario)
     assert done.code == 130
     assert f"note: {said}" in done.err
