@@ -25,6 +25,7 @@ def made(**changed: Any) -> FrictionPositioning:
     return FrictionPositioning(pulled_mass()[0], **SIZES | changed)
 
 
+@pytest.mark.matrix
 def test_the_checker_of_gymnasium_accepts_it() -> None:
     with warnings.catch_warnings():
         # Rendering is checked for environments made by name only.

@@ -82,6 +82,7 @@ def test_progress_is_told_for_each_split_of_all_data_sets() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.matrix
 @pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(

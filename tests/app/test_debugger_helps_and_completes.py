@@ -90,6 +90,7 @@ def test_an_unexpected_failure_does_not_end_the_session(monkeypatch: pytest.Monk
     assert made.reply("print t") == "0 s"
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_plot(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")

@@ -82,6 +82,7 @@ def test_nothing_is_wider_than_80_columns() -> None:
         assert "\x1b" not in line
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("session", [_bank(12), _wordy()], ids=["12", "wordy"])
 def test_nor_with_twelve_elements_or_long_names(session: Session) -> None:

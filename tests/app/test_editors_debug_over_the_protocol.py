@@ -210,6 +210,7 @@ def test_the_engine_and_other_keys_are_set_at_the_launch() -> None:
 
 
 # --------------------------------------------------------------------------- breakpoints
+@pytest.mark.matrix
 def test_a_condition_is_a_breakpoint_where_it_becomes_true() -> None:
     own = session()
     found = []

@@ -322,6 +322,7 @@ def test_a_key_without_its_number_asks_and_old_answers_go(monkeypatch: pytest.Mo
     drive(action, LARGE)
 
 
+@pytest.mark.matrix
 def test_a_guard_without_sides_and_a_run_that_fails_are_shown() -> None:
     async def action(app: FullScreen, pilot: Any) -> None:
         assert "z > 0.1 || v > 9" in app.panels["why"].shown

@@ -297,6 +297,7 @@ def test_other_things_with_such_a_name_are_left_alone(tmp_path: Path) -> None:
 
 
 # --------------------------------------------------------------------------- at once
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", [".npz", ".csv"])
 def test_three_threads_that_save_to_one_path_never_show_a_damaged_file(

@@ -109,6 +109,7 @@ def test_a_second_run_replaces_the_first_by_the_same(tmp_path: Path) -> None:
         assert contents[0][name] == contents[1][name]
 
 
+@pytest.mark.matrix
 def test_figures_and_csv_are_written_as_requested(tmp_path: Path) -> None:
     wanted = ['output.figures=["png", "pdf"]', "output.csv=true", "output.every=0.5"]
     trace, files = run_scenario(load_scenario("stribeck_sweep", wanted), tmp_path)

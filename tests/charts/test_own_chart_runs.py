@@ -253,6 +253,7 @@ def _allowed(name: str, kind: str) -> bool:
     return True
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_name_is_refused_or_changes_nothing(plain: list[Trace]) -> None:
     """Each name is the parameter once, and the variable once, beside another name; rigs in turn."""

@@ -170,6 +170,7 @@ def test_a_history_enters_the_state_that_was_active_last_and_in_it_the_initial_o
 
 
 # --------------------------------------------------------------------------- readers
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 8])
 def test_engines_agree_on_random_nested_charts(seed: int) -> None:

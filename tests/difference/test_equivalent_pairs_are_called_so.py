@@ -17,7 +17,7 @@ def with_z3() -> None:
     pytest.importorskip("z3", reason="needs z3 (extra: check)")
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("seeds", BATCHES, ids=str)
 def test_the_same_in_other_words_is_equivalent(seeds: range) -> None:

@@ -62,6 +62,7 @@ def test_a_page_without_the_marks_is_refused(script: ModuleType) -> None:
         script.filled("# A page\n", "")
 
 
+@pytest.mark.matrix
 @pytest.mark.every(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMS)

@@ -148,6 +148,7 @@ def test_what_cannot_happen_is_left_out() -> None:
     assert "(char *)" not in made.source
 
 
+@pytest.mark.matrix
 @pytest.mark.skipif(not shutil.which("g++"), reason="there is no C++ compiler")
 def test_both_forms_are_cpp(tmp_path: Path) -> None:
     export(stick_slip("signed"), "c99", tmp_path, name="it")

@@ -247,6 +247,7 @@ def test_the_name_of_a_program_points_to_its_formats(
     assert str(refused(tmp_path, PAPER, form, tmp_path / "out")).endswith(f"served by {served}")
 
 
+@pytest.mark.every(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "said"),

@@ -125,6 +125,7 @@ def test_backlash_is_found_in_the_cycles_left_out() -> None:
     assert found.held_out["rmse"] < 1.2 * NOISE
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_the_simplest_kind_is_found_leaving_records_out() -> None:
     pytest.importorskip("llvmlite", reason="fits take long without machine code")

@@ -135,6 +135,7 @@ print("stopped:", bool(found.stopped), found.training["r2"] > 0.5)
 """
 
 
+@pytest.mark.matrix
 def test_ctrl_c_in_a_program() -> None:
     running = subprocess.Popen(
         [sys.executable, "-c", PROGRAM],

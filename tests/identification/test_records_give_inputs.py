@@ -85,6 +85,7 @@ def test_choose_says_why_the_others_lost() -> None:
     assert f"Coulomb, viscous (M1): {why['Coulomb, viscous (M1)']}" in str(found)
 
 
+@pytest.mark.matrix
 def test_a_force_without_a_memory_needs_no_state_and_a_score_needs_rows():
     t = np.arange(0.0, 2.0, 0.01)
     v = 0.1 * np.sin(4.0 * t)

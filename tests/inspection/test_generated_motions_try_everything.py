@@ -105,6 +105,7 @@ def test_a_model_keeps_its_elements_and_numbers() -> None:
     assert {run.system.contact(CONTACT).model for run in found.runs} == {model}
 
 
+@pytest.mark.matrix
 def test_of_a_system_one_contact_is_tried_alone() -> None:
     stops = [
         Contact(name, charts()["end-stop"], {"x_s": u, "e": 0.5, "v_r": 0.01}, v=v)

@@ -171,6 +171,7 @@ def test_a_lesson_without_sliders_has_its_replay(pages: dict[int, Path], open_pa
     assert page.locator("#numbers").count() == 0
 
 
+@pytest.mark.matrix
 @pytest.mark.every(8)
 @pytest.mark.parametrize("number", [0, 1, 2, 4, 5, 6, 7, 9])
 def test_the_live_run_is_one_of_the_lesson(number: int) -> None:

@@ -461,6 +461,7 @@ WITHOUT = """
 """
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("absent", [["llvmlite"], ["platformdirs"]])
 def test_without_the_extra_the_message_says_what_to_install(
     absent: list[str], tmp_path: Path

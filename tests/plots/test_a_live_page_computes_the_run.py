@@ -296,6 +296,7 @@ def test_a_sweep_has_the_extremes_and_switches_of_python(live: Any) -> None:
     wait(page, "dials.get('numbers.k_i').value !== 500")
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("law", "elements"), [("published", 4), ("signed", 3), ("signed", 5)])
 def test_another_law_or_an_element_more_or_less_is_the_run_of_python(
     live: Any, law: str, elements: int

@@ -59,6 +59,7 @@ def test_a_gif_shows_the_frames_for_the_right_time(
         assert count(shown, CHART_THEMES["light"].paper) > 0.5 * shown.size[0] * shown.size[1]
 
 
+@pytest.mark.matrix
 @pytest.mark.every(2)
 @pytest.mark.parametrize("ending", VIDEOS)
 def test_a_video_shows_the_frames_for_the_right_time(

@@ -171,6 +171,7 @@ def test_bars_are_relative_margins_and_what_holds_an_edge_back_is_bold(run: Trac
     assert back.text == "|v| <= v_c"
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_compound_clauses_have_a_mark_only_and_captions_say_what_is_held() -> None:
     trace = simulate(wear(), sine(), 30.0)

@@ -297,6 +297,7 @@ def _noisy_scenario(tmp_path: Path, v_c: str) -> Path:
     return tmp_path / "noisy.toml"
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_the_command_line_warns_of_a_v_c_below_the_noise_and_suggests_one(
     gms_fsm: CommandLine, tmp_path: Path

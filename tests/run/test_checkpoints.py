@@ -315,6 +315,7 @@ def test_a_damaged_checkpoint_is_refused(path: Path) -> None:
             goes_on(path)
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("engine", "options"),

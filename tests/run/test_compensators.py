@@ -179,6 +179,7 @@ def compiled(compensator: Compensator, folder: Path, arguments: str, call: str) 
     return loaded.tick
 
 
+@pytest.mark.matrix
 @needs_c
 @pytest.mark.slow
 def test_as_c99_it_has_the_same_bits(tmp_path: Path) -> None:

@@ -394,6 +394,7 @@ def test_edges_and_columns_have_the_contact_s_name(tmp_path: Path) -> None:
 
 
 # --------------------------------------------------------------------------- many
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
     """Buffers are reused by the next run of a task; nothing of the previous run shows."""
@@ -452,6 +453,7 @@ def test_runs_that_go_one_by_one_end_with_their_own_force() -> None:
         assert found.F[run] == simulate(own, rig, 0.3, engine=FASTEST).F[-1]
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_rows_are_counted_once_where_the_log_grows() -> None:
     model, rig = stick_slip("signed"), Prescribed("2 * sin(2 * pi * t)")

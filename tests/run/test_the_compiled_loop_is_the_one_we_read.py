@@ -140,6 +140,7 @@ def agreed(model: Any, rig: Any, t_end: float, **options: Any) -> Trace:
     return one
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_run_that_fills_its_columns_many_times_over() -> None:
     """More rows, firings and stops than there is room for at first, in several calls."""

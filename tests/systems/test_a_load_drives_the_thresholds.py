@@ -100,6 +100,7 @@ def test_an_input_x_is_the_position_that_the_contact_reads() -> None:
     assert trace({"x": "x"}).contact("pad").F.tolist() == trace({}).contact("pad").F.tolist()
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES[1:])
 def test_a_friction_state_takes_the_load_and_gives_the_bits_of_a_record(engine: str) -> None:

@@ -282,6 +282,7 @@ def test_what_cannot_be_counted_as_it_comes_is_counted_from_rows(
     assert coverage(found) == one + one
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_workers_and_files_count_as_one(tmp_path: Path) -> None:
     given: Any = (stick_slip("signed"), Prescribed(FIG4_SINE), 30.0)

@@ -172,6 +172,7 @@ def test_an_array_that_claims_to_be_endless_is_refused(tmp_path: Path) -> None:
         Trace.load(path)
 
 
+@pytest.mark.every(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["header", "rows_y", "log_edge"])
 def test_an_array_that_unpacks_to_a_thousand_times_its_size_is_rejected(
@@ -240,6 +241,7 @@ def test_samples_that_overflow_are_not_finite(value: float, tmp_path: Path) -> N
     assert not np.isfinite(sampled.z).all()
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_a_long_run_at_rest_is_accepted(tmp_path: Path) -> None:
     """Everything but the times of such a trace is compressed a thousandfold, and it must load."""

@@ -41,6 +41,7 @@ COUNTS: dict[str, tuple[int, int, int, dict[str, int]]] = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", COUNTS)
 def test_what_is_proved_and_why_the_rest_is_not(name: str) -> None:
