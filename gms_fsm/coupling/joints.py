@@ -98,10 +98,9 @@ class JointGroups:
             found[group.places] = group.step(v0, v1, t, own, lost, now, mean=mean)
         return found
 
-    def copy(self, into: Any = None, /) -> Any:
-        """Return the present state, in the memory of an older copy if one is given."""
-        older = [None] * len(self.groups) if into is None else into
-        return [group.copy(old) for group, old in zip(self.groups, older, strict=True)]
+    def copy(self) -> Any:
+        """Return the present state."""
+        return [group.copy() for group in self.groups]
 
     def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
@@ -157,7 +156,6 @@ class Joints:
         self.alone = Alone()
         self.t = starts[0].t_start
         self._last: LastSample | None = None
-        self._spare: Any = None  # memory for the next copy
 
     # ------------------------------------------------------------------ samples
     def advance(self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Any]) -> Any:
@@ -190,16 +188,15 @@ class Joints:
             self.alone.leave()
 
     def _commit(self, v0: Any, v1: Any, end: float, inputs: Mapping[str, Line]) -> Any:
-        t, last, spare = self.t, self._last, self._spare
-        before = self._copy(spare)
+        t, last = self.t, self._last
+        before = self._copy()
         lost: Lost = {}
         try:
             force = self._step(v0, v1, end, inputs, lost, t)
             self.t, self._last = end, (t, v0, v1, inputs, lost, before)
-            self._spare = None if last is None else last[-1]
         except BaseException:  # Ctrl-C, too
             self._take(before)
-            self.t, self._last, self._spare = t, last, spare
+            self.t, self._last = t, last
             raise
         return force
 

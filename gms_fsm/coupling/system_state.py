@@ -193,27 +193,28 @@ class SystemState:
 
     def _end(self, dt: Any) -> float:
         """Return the end of a sample."""
-        if type(dt) is not float or not 0.0 <= dt < LATEST:
-            dt = checked_scalar("dt", dt, ">= 0")
-        return end_of(self._plant.t, dt)
+        now = self._plant.t
+        if type(dt) is float and now < (end := now + dt) < LATEST:
+            return end
+        return end_of(now, checked_scalar("dt", dt, ">= 0"))
 
     def _lines(self, inputs: Mapping[str, Any]) -> tuple[list[float], list[float]]:
         """Return the inputs at the start and at the end of a sample, or refuse them."""
-        try:
-            held = [inputs[name] for name in self._names]
-        except KeyError:
-            raise self._others(inputs) from None
-        if len(inputs) != len(held):
-            raise self._others(inputs)
+        names, held = self._names, [*inputs.values()]
+        if (*inputs,) != names:
+            held = [inputs[name] for name in self._checked(inputs)]
         for given in held:
             if type(given) is not float or given - given != 0.0:  # not finite
-                lines = [*map(_line, self._names, held)]
+                lines = [*map(_line, names, held)]
                 return [start for start, _ in lines], [end for _, end in lines]
         return held, held
 
-    def _others(self, inputs: Mapping[str, Any]) -> ParameterError:
+    def _checked(self, inputs: Mapping[str, Any]) -> tuple[str, ...]:
+        """Return the names of all inputs if these are given, in any order."""
         names = self._names
-        return ParameterError(
+        if {*inputs} == {*names}:
+            return names
+        raise ParameterError(
             f"the inputs given are {', '.join(sorted(inputs)) or 'none'}",
             place=f"system {self.system.name!r}",
             advice=f"give {', '.join(f'{name}=...' for name in names)}"

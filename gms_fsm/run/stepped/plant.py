@@ -87,7 +87,6 @@ class Plant:
         self.t, self.lost = t, tuple[SystemSwitch, ...]()
         self.told = frozenset[SystemSwitch]()
         self.last: LastSample | None = None
-        self._spare: Any = None  # memory for the next copy
         self._sees_ends = _sees_ends(self.start)
         self._steps = self.start.program.plan.steps
         self._knots: tuple[float, list[float]] = -np.inf, []  # up to when, and they
@@ -127,8 +126,8 @@ class Plant:
     # ------------------------------------------------------------------ samples
     def commit(self, end: float, first: list[float], last: list[float]) -> None:
         """Advance by a sample, in which inputs go from first to last; if that fails, stay."""
-        t, before, spare, told = self.t, self.last, self._spare, NONE
-        backup = state = self._copy(spare)
+        t, before, told = self.t, self.last, NONE
+        backup = state = self._copy()
         try:
             # Of a sample without length only its end matters.
             if (
@@ -139,11 +138,10 @@ class Plant:
             ):
                 state, told = self._again(before, backup)
             lost = self._advanced(t, end, first, last)
-            self._spare = None if before is None else before[4]
             self.t, self.last, self.lost, self.told = end, (t, end, first, last, state), lost, told
         except BaseException:  # Ctrl-C, too
             self._take(backup)
-            self.t, self.last, self._spare = t, before, None
+            self.t, self.last = t, before
             raise
 
     def _again(self, last: LastSample, now: Any) -> tuple[Any, frozenset[SystemSwitch]]:
@@ -242,14 +240,13 @@ class Plant:
         self, end: float, first: list[float], last: list[float], names: Sequence[str]
     ) -> list[float]:
         """Return values at the end of a sample, and stay."""
-        now, copy, spare = self._standing, self._copy(), self._spare
+        now, copy = self._standing, self._copy()
         try:
-            self._spare = None
             self.commit(end, first, last)
             return [self.value(name) for name in names]
         finally:
             self._take(copy)
-            self._standing, self._spare = now, spare
+            self._standing = now
 
     def send(self, event: str) -> None:
         """Let an event wait for the next sample."""
@@ -363,13 +360,12 @@ class Plant:
 
     def snapshot(self) -> Snapshot:
         """Return the present state."""
-        return Snapshot(self.t, self.identity, (self._copy(), _with(self._standing, _copied)))
+        return Snapshot(self.t, self.identity, (self._copy(), self._standing))
 
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot."""
-        copy, standing = content_of(snapshot, Snapshot, self.identity)
+        copy, self._standing = content_of(snapshot, Snapshot, self.identity)
         self._take(copy)
-        self._standing, self._spare = _with(standing, _copied), None
 
     def packed(self) -> tuple[Any, Standing]:
         """Return the present state as lists, without addresses in memory."""
@@ -415,10 +411,6 @@ def _viewed(array: Any) -> Any:
     """Return a view whose items are read in half the time of those of an array."""
     given: Any = array
     return memoryview(given) if isinstance(array, np.ndarray) else array
-
-
-def _copied(before: Any) -> Any:
-    return before.copy() if isinstance(before, np.ndarray) else before
 
 
 def _lists(state: Mapping[str, Any]) -> dict[str, list[float]]:
