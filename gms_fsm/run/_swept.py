@@ -46,7 +46,7 @@ class Sweep:
     Attributes
     ----------
     parameters : mapping of str to ndarray, shape (runs,) or (runs, n)
-        The parameters that were varied.
+        The parameters that were varied; of signals their texts.
     outcome : ndarray of str, shape (runs,)
         ``"ok"``, or the name of the error that ended the run.
     message : ndarray of str, shape (runs,)
@@ -387,8 +387,11 @@ def _read(file: Any) -> Sweep:
         floats["rows_z"] = (runs, rows, n)
         floats |= {f"rows_{row_name(name.removeprefix('end_'))}": (runs, rows) for name in ends}
     own = [name for name in file.files if name.startswith("parameter_")]
-    found = {name: member(file, name, 8 * runs * n) for name in own}
+    found = {name: member(file, name, runs * max(8 * n, 4 * LONGEST)) for name in own}
     for name, array in found.items():  # a contact has some of the elements of a system
+        if array.dtype.kind == "U":
+            texts[name] = (runs,)
+            continue
         width = min(n, *array.shape[1:2]) if "owners" in texts and array.ndim > 1 else n
         floats[name] = (runs, width)[: array.ndim]
     for shapes, width in ((texts, 4 * LONGEST), (floats, 8)):

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.errors import GMSError, ParameterError, cut, shown
@@ -29,8 +29,12 @@ from gms_fsm.run.recording.counted import LARGE, CountTables
 from gms_fsm.run.repeated.beginnings import (
     initial_size,
     periods_of,
+    signals_given,
+    signals_of,
+    told,
     with_initial,
     with_periods,
+    with_signals,
 )
 from gms_fsm.run.repeated.block import RepeatedRun
 from gms_fsm.run.repeated.collected import (
@@ -87,8 +91,9 @@ def sweep(
         ``C``, ``v_c``), ``weights``, ``sigma_2``, ``F_c``, ``F_s``, ``v_s``, ``delta``, and the
         rig's numbers (``mass``, ``stiffness``, ``speed``). Of a system, ``numbers.m`` is one of its
         numbers, and ``gear.F_s`` a parameter of the contact gear. ``initial.v`` and ``initial.z2``
-        are initial values, as `initial` names them; ``pid.period`` is the period of what ticks. In
-        a DataFrame, use ``k1``, ``k2`` ... for elements.
+        are initial values, as `initial` names them; ``pid.period`` is the period of what ticks;
+        ``signals.u`` is a list of signals for an input or a signal, without ``signals.`` for that
+        of a rig (``v``, ``F_a``). In a DataFrame, use ``k1``, ``k2`` ... for elements.
     executor : concurrent.futures.Executor, optional
         Where to run: a process pool, or the executor of a Dask ``Client`` (extra ``cluster``).
         Threads on this machine if omitted; compiled runs release the interpreter lock.
@@ -137,9 +142,11 @@ def sweep(
     what = mounted(model, on, begin.settings.held_period)
     if begin.settings.engine == "compiled":
         check_llvmlite()
-    first = begin.start(what)  # errors common to all runs are raised once, here
+    signals = signals_given(what, given)
+    its = with_signals(what, {name: each[0] for name, each in signals.items()})
+    first = begin.start(its)  # errors common to all runs are raised once, here
     begin = begin.counting(first)
-    values = _values(first, given)
+    values = _values(first, given, signals)
     runs = len(next(iter(values.values())))
     if executor is not None and not hasattr(executor, "submit"):
         raise ParameterError(
@@ -176,13 +183,15 @@ def sweep(
         finally:  # also on Ctrl-C: pending tasks are not started
             for future in waiting:
                 future.cancel()
-    return collected.sweep(values)
+    return collected.sweep({name: told(each) for name, each in values.items()})
 
 
 # --------------------------------------------------------------------------- parameters
 def _values(
-    start: Problem, parameters: Mapping[str, ArrayLike] | pandas.DataFrame
-) -> dict[str, FloatArray]:
+    start: Problem,
+    parameters: Mapping[str, ArrayLike] | pandas.DataFrame,
+    signals: Mapping[str, NDArray[Any]],
+) -> dict[str, NDArray[Any]]:
     """Check the names and shapes of the parameters."""
     what = start.what
     if not hasattr(parameters, "keys"):
@@ -199,11 +208,14 @@ def _values(
         given = _elements_joined(given, names)
     if not given:
         raise ParameterError("parameters is empty", advice="give at least one name with its values")
-    arrays: dict[str, FloatArray] = {}
+    arrays: dict[str, NDArray[Any]] = {}
     for name, value in given.items():
+        if name in signals:
+            arrays[name] = signals[name]
+            continue
         begins = name.startswith(INITIAL) and name not in names
         if not begins and name not in names:
-            raise unknown("parameter", name, names, place="parameters")
+            raise unknown("parameter", name, [*names, *signals_of(what)], place="parameters")
         try:
             array = np.array(value, dtype=np.float64)
         except (TypeError, ValueError):
@@ -334,10 +346,13 @@ def _each(
     """Make runs one by one: with numbers that are another program, or that may be refused."""
     results: dict[int, RunResult] = {}
     compiled: CompiledRun | None = None
-    known = known_in(what)
-    others = [name for name in part if name not in known]
+    known, signals = known_in(what), signals_of(what)
+    driven = [name for name in part if name in signals]
+    others = [name for name in part if name not in known and name not in signals]
     periods = [name for name in others if not name.startswith(INITIAL)]
-    first = begin.start(what) if len(others) > len(periods) else None
+    first = None
+    if len(others) > len(periods):
+        first = begin.start(with_signals(what, {name: part[name][0] for name in driven}))
     for row in rows:
         values = {name: array[row] for name, array in part.items()}
         run: Run | CompiledRun | None = None
@@ -345,6 +360,7 @@ def _each(
         try:
             its = varied(what, {name: each for name, each in values.items() if name in known})
             its = with_periods(its, {name: values[name] for name in periods})
+            its = with_signals(its, {name: values[name] for name in driven})
             begun = None
             if first is not None:
                 given = {name: values[name] for name in others if name not in periods}
@@ -352,6 +368,7 @@ def _each(
             if (
                 compiled is not None
                 and not periods
+                and not driven
                 and same_text(compiled.start.system, its.system)
             ):
                 compiled.reset(its, begun)  # the same buffers and machine code
@@ -384,6 +401,8 @@ def _many(
     tables: CountTables | None,
 ) -> ManyRuns | None:
     """Make the runs whose numbers need no look, all in machine code; None if there are none."""
+    if signals_of(what).keys() & part.keys():
+        return None
     if getattr(_of_thread, "sweep_name", "") != sweep_name:
         start = begin.start(what)
         driven = any(body.driven and what.named for body in what.system.bodies)

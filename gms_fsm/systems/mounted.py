@@ -17,7 +17,7 @@ from gms_fsm.scenarios import shipped
 from gms_fsm.systems.models import Model, is_model
 from gms_fsm.systems.parts import Contact
 from gms_fsm.systems.reading.assembly import Assembly
-from gms_fsm.systems.rigs import Prescribed, Rig
+from gms_fsm.systems.rigs import Prescribed, Rig, TextRig
 from gms_fsm.systems.signals import Signal, SignalLike
 from gms_fsm.systems.system import System, system_of
 
@@ -170,11 +170,14 @@ class Mounted:
         return replace(self, model=self.system.contact(contact), named=False)
 
     def driven(self, signals: Mapping[str, Signal]) -> Mounted:
-        """Return the same with other signals; of a model its velocity v, whatever moved it."""
+        """Return the same with other signals, of a rig with all; with v the velocity is given."""
         if self.named:
             return mounted(replace(self.system, signals={**self.system.signals, **signals}))
-        others = {name: signal for name, signal in signals.items() if name != "v"}
-        return mounted(self.model, Prescribed(signals["v"], others))
+        others, was = {name: each for name, each in signals.items() if name != "v"}, self.rig
+        rig: Rig = TextRig(was.title, was.acceleration, others, was.numbers)
+        if "v" in signals:
+            rig = Prescribed(signals["v"], others)
+        return mounted(self.model, rig, self.system.contacts[0].period)
 
     @property
     def bindable(self) -> tuple[str, ...]:

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gms_fsm import Sweep, Trace, simulate, sweep
+from gms_fsm import Body, Contact, Prescribed, Slider, Sweep, System, Trace, simulate, sweep
+from gms_fsm.charts import CHARTS
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in, value_in, varied
 from tests.corpus import FAILING, FEW, QUICK, each, in_turn, outcome, run
 from tests.exporters.frictions import servo
-from tests.helpers import FASTEST
+from tests.helpers import FASTEST, stick_slip
 
 FACTORS = (1.0, 1.01, 0.99)  # of every number at once
 LEFT_OUT = {"numbers.V"}  # the velocity that a run begins with
@@ -122,3 +123,36 @@ def test_initial_values_and_periods_vary_by_name(engine: str, tmp_path: Path) ->
             assert found.ends["u"][k] == one.value("u")[-1]
             assert found.transition_count[k] == len(one.transitions)
         same(Sweep.load(found.save(tmp_path / "runs.npz")), found)
+
+
+PUSHED = System(
+    "pushed",
+    bodies=(Body("mass", inertia=1.0, force="u + w"),),
+    contacts=(Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.1}),),
+    numbers={"seed": 1.0},
+    signals={"w": "2 * noise(floor(5 * t), seed)"},
+    inputs=("u",),
+)
+
+
+@pytest.mark.parametrize("engine", sorted({"ifelse", FASTEST}))
+def test_signals_and_seeds_vary_by_name(engine: str, tmp_path: Path) -> None:
+    given: list[Any] = [[(0, 0), (1, 3)], ([0.0, 0.5, 2.0], [1.0, 3.0, 0.0]), [(0, 2), (1, 2)]]
+    seeds = [1.0, 2.0, 2.0]
+    found = sweep(PUSHED, 2.0, {"signals.u": given, "numbers.seed": seeds}, engine=engine)
+    for k in range(3):
+        its = replace(PUSHED, numbers={"seed": seeds[k]})
+        one = simulate(its, 2.0, inputs={"u": given[k]}, engine=engine)
+        assert found.ends["mass.x"][k] == one.body("mass").x[-1] != 0.0
+        assert found.transition_count[k] == len(one.transitions)
+    same(Sweep.load(found.save(tmp_path / "runs.npz")), found)
+
+
+@pytest.mark.parametrize("name", ["v", "F_a"])
+def test_a_rig_is_given_signals(name: str) -> None:
+    model, given = stick_slip("signed"), ["0.2", "0.3*sin(t)", [(0, 0), (1, 1)]]
+    rigs = [Prescribed(each) if name == "v" else Slider(2.0, each) for each in given]
+    found = sweep(model, rigs[0], 2.0, {name: given}, engine="ifelse")
+    alone = [simulate(model, each, 2.0, engine="ifelse") for each in rigs]
+    assert [*found.x] == [each.x[-1] for each in alone]
+    assert found.parameters[name].tolist() == [*given[:2], "signal 2"]

@@ -1,4 +1,4 @@
-"""What differs from run to run besides numbers: initial values and periods, by their names."""
+"""What differs from run to run besides numbers, by name: initial values, periods, signals."""
 
 from __future__ import annotations
 
@@ -8,14 +8,20 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray, Parameter, checked_scalar
+from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.gradients.directions import INITIAL, initial_places
+from gms_fsm.run._swept import LONGEST
 from gms_fsm.run.problem import Problem
 from gms_fsm.systems.mounted import Mounted, mounted
+from gms_fsm.systems.numbers import known_in
 from gms_fsm.systems.parts import Sampled
+from gms_fsm.systems.signals import Formula, as_signal
 
 PERIOD = ".period"
+SIGNALS = "signals"  # the owner of those of a system
 WORD = re.compile(r"(?<![\w.])period\b")
 
 
@@ -82,3 +88,50 @@ def with_initial(start: Problem, given: Mapping[str, Any]) -> dict[str, Any]:
         key = next(key for key, place in layout.keys.items() if place == home)
         found[key] = values if home in layout.y.own else float(values[0])
     return found
+
+
+def signals_of(what: Mounted) -> dict[str, str]:
+    """Return the signals by the names that a sweep has for them: of a system, inputs too."""
+    system = what.system
+    own = (*system.signals, *system.open) if what.named else what.rig.signals
+    known = known_in(what)
+    return {each: name for name in own if (each := what.of(SIGNALS, name)) not in known}
+
+
+def signals_given(what: Mounted, parameters: Any) -> dict[str, NDArray[Any]]:
+    """Return of each signal that differs those of all runs; texts of a system are read later."""
+    found: dict[str, NDArray[Any]] = {}
+    for name in signals_of(what) if hasattr(parameters, "keys") else ():
+        if name not in parameters:
+            continue
+        here, given = f"parameters[{name!r}]", parameters[name]
+        several = [] if isinstance(given, str) or not np.iterable(given) else [*given]
+        if not several:
+            raise ParameterError(
+                "it must be a list, one signal for each run", place=here, value=given
+            )
+        found[name] = np.empty(len(several), dtype=object)
+        for k, each in enumerate(several):
+            try:
+                text = what.named and isinstance(each, str)
+                found[name][k] = each if text else as_signal(each)
+            except GMSError as error:
+                raise error.inside(f"{here}[{k}]") from None
+    return found
+
+
+def with_signals(what: Mounted, given: Mapping[str, Any]) -> Mounted:
+    """Return the same with other signals, by their names in a sweep."""
+    if not given:
+        return what
+    names = signals_of(what)
+    return what.driven({**what.rig.signals, **{names[each]: u for each, u in given.items()}})
+
+
+def told(values: NDArray[Any]) -> NDArray[Any]:
+    """Return what a result says of a parameter: numbers, or of signals their texts."""
+    if values.dtype != object:
+        return values
+    texts = [each.text if isinstance(each, Formula) else each for each in values]
+    runs = enumerate(texts)
+    return np.array([cut(u, LONGEST) if isinstance(u, str) else f"signal {k}" for k, u in runs])
