@@ -39,9 +39,8 @@ from integrators.machine_code.readable.c_records import CBlock, records_text
 from integrators.machine_code.readable.possible import BlockStart
 from integrators.machine_code.readable.simplified import simplified
 from integrators.machine_code.tuning import INLINE
-from integrators.runners.stepping import FULL_LOG
 
-FIELDS = ("t", "switches", "logged", "engine")  # of the struct
+FIELDS = ("t", "switches", "logged", "engine", "before")  # of the struct
 # Numbers of the block that the functions beside the engine write.
 GIVEN = (
     "sample.end", "sample.resumed", "sample.switches", "buffers.plan.max_steps",
@@ -196,7 +195,6 @@ class _Text:
             given="\n".join(given),
             resumed=text(place("sample.resumed")),
             switches=text(place("sample.switches")),
-            full_log=FULL_LOG,
             found="\n".join(found) or "    (void)block;\n    (void)parameter;",
             set="\n".join(put),
             time_scale=text(place("buffers.plan.control.time_scale")),
@@ -221,7 +219,7 @@ class _Text:
         module = simplified(translator.module, start, given, kept)
         public = ("init", "advance", "advance_to", "get", "set", "switch", "edge", "message")
         own = [f"{self.name}_{each}" for each in (*public, "state", "engine")]
-        return records_text(module, self.block, [*own, "show", "is_number", "place_of"])
+        return records_text(module, self.block, [*own, "show", "is_number", "place_of", "LATEST"])
 
     def _shown(self) -> str:
         lines = []

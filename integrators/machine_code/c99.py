@@ -10,6 +10,7 @@ import re
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 
+from integrators.machine_code.locals import assigned_once, declarations, mentioned
 from integrators.machine_code.tree import (
     Address,
     AddressOf,
@@ -266,7 +267,14 @@ class CWriter:
         self.functions, self.name, self.field = functions, locals_, fields
         self.counter = 0  # of results with several parts
         self.read = set[str]()
+        self.here = dict[int, frozenset[str]]()  # what statements declare, by their `id`
+        self.before = dict[int, list[Local]]()  # what is declared before them
+        self.once = assigned_once(function.body)
         self.unread = self._unread()
+        found = declarations(function.body)
+        self.here = {at: names - self.unread for at, names in found.items()}
+        later = frozenset[str]().union(*self.here.values())
+        self.first = [v for v in function.variables if v.name not in self.unread | later]
 
     def _unread(self) -> set[str]:
         """Return the variables that are only written, which compilers warn of."""
@@ -290,13 +298,11 @@ class CWriter:
             f"{head}{_result(function.results)} {self.functions(function.name)}({names or 'void'})"
         )
         lines = [opening, "{"]
-        used = [v for v in function.variables if v.name not in self.unread]
-        for type_ in dict.fromkeys(
-            map(self.declared, sorted(used, key=lambda v: "fibp".find(v.kind)))
-        ):
-            own = [self.name(v.name) for v in used if self.declared(v) == type_]
-            star = ", *" if type_.endswith("*") else ", "
-            lines.append(f"    {type_}{star.join(own)};")
+        left = self.first
+        for statement in function.body:
+            inside = mentioned((statement,))
+            self.before[id(statement)] = [each for each in left if each.name in inside]
+            left = [each for each in left if each.name not in inside]
         self.read.clear()
         body = self.block(function.body, 1)
         if body and body[-1] == "    return;":
@@ -305,9 +311,28 @@ class CWriter:
         lines += [f"    (void){self.name(each)};" for each in unused]
         return "\n".join([*lines, *body, "}", ""])
 
+    def _declarations(self, statement: Statement) -> Iterator[str]:
+        """Write the declarations of locals that get their values inside a statement."""
+        locals_ = self.before.get(id(statement), [])
+        types = [*map(self.declared, locals_)]
+        for type_ in dict.fromkeys(types):
+            own = [self.name(v.name) for v, its in zip(locals_, types, strict=True) if its == type_]
+            star = ", *" if type_.endswith("*") else ", "
+            yield f"    {type_}{star.join(own)};"
+
     def declared(self, local: Local) -> str:
         """Write the type of a local."""
         return f"{TYPES[local.kind]} ".replace("* ", "*")
+
+    def beginning(self, local: Local) -> str:
+        """Write what stands before a local that is declared where it gets its value."""
+        const = local.name in self.once and local.kind != "p"
+        return f"{'const ' * const}{self.declared(local)}"
+
+    def target(self, statement: Statement, local: Local) -> str:
+        """Write a local that a statement gives a value to, declared if it is not yet."""
+        here = local.name in self.here.get(id(statement), ())
+        return f"{self.beginning(local) if here else ''}{self.name(local.name)}"
 
     def heading(self) -> str:
         """Write what stands before a function."""
@@ -316,7 +341,11 @@ class CWriter:
     # ------------------------------------------------------------------ statements
     def block(self, body: Sequence[Statement], depth: int) -> list[str]:
         """Write statements."""
-        return [line for statement in body for line in self.statement(statement, depth)]
+        return [
+            line
+            for each in body
+            for line in (*self._declarations(each), *self.statement(each, depth))
+        ]
 
     def statement(self, statement: Statement, depth: int) -> list[str]:
         """Write a statement."""
@@ -326,13 +355,13 @@ class CWriter:
                 if target.name in self.unread:
                     kept = may_write(value) or any(isinstance(u, Callback) for u in parts_of(value))
                     return [f"{space}{self.value(value)};"] if kept else []
-                return [f"{space}{self.name(target.name)} = {self.value(value)};"]
+                return [f"{space}{self.target(statement, target)} = {self.value(value)};"]
             case AssignMany(targets=targets, call=call):
                 self.counter += 1
                 whole = self.name(f"many.{self.counter}")
                 made = f"{space}const many_{self.results[call.name]} {whole} = {self.value(call)};"
                 parts = [
-                    f"{space}{self.name(each.name)} = {whole}.v{k};"
+                    f"{space}{self.target(statement, each)} = {whole}.v{k};"
                     for k, each in enumerate(targets)
                     if each.name not in self.unread
                 ]
@@ -355,7 +384,8 @@ class CWriter:
             case For(target=target, start=start, stop=stop, step=step, body=body):
                 name = self.name(target.name)
                 more = f"{name}++" if step == 1 else f"{name} += {step}"
-                head = f"{name} = {self.value(start)}; {name} < {self.value(stop, 7)}; {more}"
+                first = f"{self.target(statement, target)} = {self.value(start)}"
+                head = f"{first}; {name} < {self.value(stop, 7)}; {more}"
                 return [f"{space}for ({head}) {{", *self.block(body, depth + 1), f"{space}}}"]
             case Break():
                 return [f"{space}break;"]

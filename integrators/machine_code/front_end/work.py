@@ -115,16 +115,16 @@ class Work:
         self.out.append(Assign(local, as_kind(self, expr, local.kind)))
         return local
 
-    def fresh(self, word: str = "kept") -> str:
+    def fresh(self, word: str = "value") -> str:
         """Return a name that no variable has; a word for readers ends it."""
         self.temporary += 1
         return f".{self.temporary}.{word}"
 
-    def new(self, kind: str, to: str = "", word: str = "kept") -> Local:
+    def new(self, kind: str, to: str = "", word: str = "value") -> Local:
         """Return a new local variable."""
         return self.variable(self.fresh(word), kind, to)
 
-    def kept(self, expr: Expr, word: str = "kept") -> Expr:
+    def kept(self, expr: Expr, word: str = "value") -> Expr:
         """Return an expression that keeps its present value."""
         if isinstance(expr, Const | Global) or expr in self.parameters:
             return expr

@@ -32,12 +32,15 @@ from integrators.machine_code.tree import (
     SIZES,
     Address,
     AddressOf,
+    AssignMany,
     Const,
     Expr,
     Global,
     Load,
     Local,
     Module,
+    Return,
+    Statement,
     TypedFunction,
     expressions_in,
 )
@@ -260,6 +263,15 @@ class _NamedWriter(CWriter):
         """Write what stands before a function."""
         about = re.sub(r"`(?:[\w.]+\.)?(\w+)`", r"\1", self.function.about)
         return f"/* {about} */\n" if about and not self.function.entry else ""
+
+    def block(self, body: Sequence[Statement], depth: int) -> list[str]:
+        """Write statements; results that are only returned have no names."""
+        match body:
+            case (*others, AssignMany(targets=targets, call=call), Return(values=values)) if (
+                targets == values and self.results[call.name] == self.function.results
+            ):
+                body = *others, Return((call,))
+        return super().block(body, depth)
 
     def bare(self, expr: Expr) -> tuple[str, int]:
         """Write an expression; return also how tightly it binds."""

@@ -49,6 +49,7 @@ from integrators.machine_code.tree import (
     While,
     expressions_in,
     expressions_of,
+    locals_in,
     parts_of,
     statements_of,
 )
@@ -56,6 +57,7 @@ from integrators.machine_code.tree import (
 __all__ = ["simplified"]
 
 Body = tuple[Statement, ...]
+SMALL = 12  # parts of an expression that may stand inside another one
 
 
 def simplified(
@@ -374,12 +376,11 @@ def _forwarded(function: TypedFunction) -> TypedFunction:
             elif isinstance(each, While | For):
                 each = replace(each, body=block(each.body))
             if isinstance(each, Assign) and once(each.target) and _small(each.value):
-                if isinstance(each.value, Local) and each.value.name in waiting:
-                    each = replace(each, value=waiting.pop(each.value.name).value)
+                inside = {u.name for u in locals_in(each.value)} & waiting.keys()
+                each = _filled(each, {name: waiting.pop(name) for name in inside})
                 waiting[each.target.name] = each
                 continue
             each = _moved_into(each, waiting, made)
-            waiting.clear()
             match made[-1] if made else None, each:
                 case AssignMany(targets=targets) as call, Assign(target, Local() as source) if (
                     source in targets
@@ -407,13 +408,13 @@ def _forwarded(function: TypedFunction) -> TypedFunction:
 
 
 def _small(value: Expr) -> bool:
-    return isinstance(value, Local | Const | Load | AddressOf) and _pure(value)
+    return _pure(value) and sum(1 for _ in parts_of(value)) <= SMALL
 
 
 def _moved_into(
-    statement: Statement, waiting: Mapping[str, Assign], made: list[Statement]
+    statement: Statement, waiting: dict[str, Assign], made: list[Statement]
 ) -> Statement:
-    """Return a statement that reads values where they were; append the others that wait."""
+    """Return a statement that reads values where they were; append others that cannot wait."""
     if not waiting:
         return statement
     expressions = () if isinstance(statement, While | For) else expressions_of(statement)
@@ -423,10 +424,21 @@ def _moved_into(
     top = sum(isinstance(each, Invoke) for each in expressions)
     allowed = calls <= top <= 1
     inside = {part.name for e in expressions for part in parts_of(e) if isinstance(part, Local)}
-    made += [each for name, each in waiting.items() if not (allowed and name in inside)]
-    if not allowed:
-        return statement
-    given = {name: each.value for name, each in waiting.items() if name in inside}
-    return with_expressions(
-        statement, lambda e: given.get(e.name, e) if isinstance(e, Local) else e
-    )
+    given = {name: waiting.pop(name) for name in inside & waiting.keys()} if allowed else {}
+    target = None
+    if isinstance(statement, Assign) and _pure(statement.value):
+        target = statement.target
+    for name, each in [*waiting.items()]:
+        if target is None or target in locals_in(each.value):
+            made.append(waiting.pop(name))
+    filled: Statement = _filled(statement, given)
+    return filled
+
+
+def _filled(statement: Statement, given: Mapping[str, Assign]) -> Any:
+    """Return a statement, of the same class, with values for locals that are assigned them."""
+
+    def value(expr: Expr) -> Expr:
+        return given[expr.name].value if isinstance(expr, Local) and expr.name in given else expr
+
+    return with_expressions(statement, value)

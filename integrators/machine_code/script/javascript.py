@@ -15,17 +15,15 @@ from collections.abc import Callable, Mapping
 from integrators.machine_code.c99 import CFields, CNames, CWriter, calls
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
-from integrators.machine_code.script.locals import declarations, without_copies
+from integrators.machine_code.locals import without_copies
 from integrators.machine_code.tree import (
     Address,
     AddressOf,
-    Assign,
     AssignMany,
     Callback,
     Choose,
     Const,
     Expr,
-    For,
     Foreign,
     Global,
     Load,
@@ -134,7 +132,6 @@ class _Script(CWriter):
         tables: Mapping[str, int],
     ) -> None:
         self.tables = tables
-        self.let_at = dict[int, frozenset[str]]()
         super().__init__(function, results, functions, locals_, CFields(()))
 
     def text(self, *, static: bool) -> str:
@@ -143,13 +140,7 @@ class _Script(CWriter):
         function = self.function
         names = ", ".join(self.name(each.name) for each in function.parameters)
         lines = [f"function {self.functions(function.name)}({names}) {{"]
-        self.let_at = {at: names - self.unread for at, names in declarations(function.body).items()}
-        later = {name for names in self.let_at.values() for name in names}
-        own = [
-            f"{self.name(each.name)} = {_ZEROS[each.kind]}"
-            for each in function.variables
-            if each.name not in self.unread | later
-        ]
+        own = [f"{self.name(each.name)} = {_ZEROS[each.kind]}" for each in self.first]
         if own:
             lines.append(f"    let {', '.join(own)};")
         body = self.block(function.body, 1)
@@ -157,20 +148,20 @@ class _Script(CWriter):
             body.pop()
         return "\n".join([*lines, *body, "}", ""])
 
+    def beginning(self, local: Local) -> str:
+        """Write what stands before a local that is declared where it gets its value."""
+        del local
+        return "let "
+
     # ------------------------------------------------------------------ statements
     def statement(self, statement: Statement, depth: int) -> list[str]:
         """Write a statement."""
-        space, declared = "    " * depth, self.let_at.get(id(statement), frozenset())
+        space = "    " * depth
         match statement:
-            case Assign(target=target) | For(target=target) if target.name in declared:
-                first, *more = super().statement(statement, depth)
-                begin = "for (" if isinstance(statement, For) else space
-                return [first.replace(begin, f"{begin}let ", 1), *more]
             case AssignMany(targets=targets, call=call):
                 kinds = self.results[call.name]
-                let = ["let " if each.name in declared else "" for each in targets]
                 return [f"{space}{self.value(call)};"] + [
-                    f"{space}{let[k]}{self.name(each.name)} = F[{k}]"
+                    f"{space}{self.target(statement, each)} = F[{k}]"
                     f"{' !== 0' if kinds[k] == 'b' else ''};"
                     for k, each in enumerate(targets)
                     if each.name not in self.unread

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from integrators.machine_code.script.locals import assigned
+from integrators.machine_code.locals import assigned
 from integrators.machine_code.tree import (
     Address,
     AddressOf,

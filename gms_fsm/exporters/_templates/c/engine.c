@@ -7,6 +7,8 @@
 
 #include <string.h>
 $engine
+static const double LATEST = $latest; /* s: later, the clock would be too coarse */
+
 static bool is_number(double u)
 {
     return u - u == 0.0;
@@ -39,23 +41,23 @@ int ${name}_advance_to(${name}_state *s, ${lines}double t, int64_t max_steps)
 {
     ${name}_engine *block = &s->engine;
     int64_t code, switches;
-    if (${unless_numbers}!(t >= s->t && t <= $latest) || max_steps < 1)
+    if (${unless_numbers}!(t >= s->t && t <= LATEST) || max_steps < 1)
         return ${name}_BAD_ARGUMENT;
-    const ${name}_engine before = s->engine;
+    s->before = s->engine;
     $end = t;
     $most = max_steps;
 $given
     $resumed = 0;
     code = step(block);
     switches = $switches;
-    while (code == $full_log) { /* the log is full: empty it, and go on */
+    while (code == FULL_LOG) { /* empty it, and go on */
         $switches = 0;
         $resumed = 1;
         code = step(block);
         switches += $switches;
     }
     if (code != ${name}_OK) {
-        s->engine = before;
+        s->engine = s->before;
         return (int)code;
     }
     s->switches += switches;

@@ -26,6 +26,7 @@ $fields
     int64_t logged;   /* switches in the log: those of the last call, or the last of them if there
                          were $log_length or more */
     ${name}_engine engine; /* private */
+    ${name}_engine before; /* private: to return to after an error */
 } ${name}_state;
 
 /* What the functions return. */

@@ -42,17 +42,17 @@ def declarations(body: tuple[Statement, ...]) -> dict[int, frozenset[str]]:
     True
     """
     found: dict[int, frozenset[str]] = {}
-    _declare(body, _names_in(body), found)
+    _declare(body, mentioned(body), found)
     return found
 
 
 def _declare(
     block: tuple[Statement, ...], free: frozenset[str], found: dict[int, frozenset[str]]
 ) -> None:
-    mentioned = [_names_in((each,)) & free for each in block]
-    counts = Counter(name for names in mentioned for name in names)
+    named = [mentioned((each,)) & free for each in block]
+    counts = Counter(name for names in named for name in names)
     seen = frozenset[str]()
-    for statement, names in zip(block, mentioned, strict=True):
+    for statement, names in zip(block, named, strict=True):
         alone = frozenset(name for name in names if counts[name] == 1)
         read = frozenset(u.name for expr in expressions_of(statement) for u in locals_in(expr))
         set_here = frozenset(each.name for each in targets_of(statement))
@@ -63,11 +63,12 @@ def _declare(
         seen |= names
         inner = blocks_of(statement)
         for k, each in enumerate(inner):
-            others = _names_in(*(u for j, u in enumerate(inner) if j != k))
+            others = mentioned(*(u for j, u in enumerate(inner) if j != k))
             _declare(each, alone - read - set_here - others, found)
 
 
-def _names_in(*blocks: tuple[Statement, ...]) -> frozenset[str]:
+def mentioned(*blocks: tuple[Statement, ...]) -> frozenset[str]:
+    """Return the names of the locals that statements read or assign to."""
     read = (u.name for block in blocks for u in expressions_in(block) if isinstance(u, Local))
     return assigned(*blocks) | frozenset(read)
 
@@ -76,6 +77,14 @@ def assigned(*blocks: tuple[Statement, ...]) -> frozenset[str]:
     """Return the names of the locals that statements assign to."""
     within = (each for block in blocks for each in statements_of(block))
     return frozenset(u.name for each in within for u in targets_of(each))
+
+
+def assigned_once(body: tuple[Statement, ...]) -> frozenset[str]:
+    """Return the locals that one statement only gives a value to, and which do not count a loop."""
+    within = [*statements_of(body)]
+    sets = Counter(u.name for each in within for u in targets_of(each))
+    counting = {each.target.name for each in within if isinstance(each, For)}
+    return frozenset(name for name, count in sets.items() if count == 1) - counting
 
 
 # --------------------------------------------------------------------------- copies
@@ -94,7 +103,7 @@ def without_copies(function: TypedFunction) -> TypedFunction:
     sets = Counter(u.name for each in within for u in targets_of(each))
     once = {name for name, count in reads.items() if count == 1 and sets[name] == 1}
     body = _joined(function.body, once)
-    left = _names_in(body)
+    left = mentioned(body)
     variables = tuple(each for each in function.variables if each.name in left)
     return replace(function, body=body, variables=variables)
 
