@@ -2048,6 +2048,10 @@ SEEN = Chart(
 )
 STILL = Prescribed("0")
 ROOM = System("room", supervisors=(Supervisor("mode", SEEN, inputs={"P": 1.0}),), flow={"T": "1"})
+ALL_EARS = dataclasses.replace(
+    SEEN, transitions=tuple(Transition(f"to{k}", "on", "on", event=f"e{k}") for k in range(28))
+)
+EARS = System("ears", supervisors=(Supervisor("mode", ALL_EARS, inputs={"P": 1.0}),))
 KICKED = Chart("kick", states=(State("on", entry={"v": "1"}, outputs={"F": "0"}),))
 rows = {
     "text for a model": ("model", "GMS", lambda: simulate("GMS", Prescribed("0"), 1.0)),
@@ -2068,6 +2072,7 @@ rows = {
         ...,
         lambda: simulate(GIVEN, Prescribed("mod(t, 1e-7)"), 1.0),
     ),
+    "too many events": ("system 'ears'", ..., lambda: simulate(EARS, 1.0)),
     "text for a rig": ("rig", "0.1*t", lambda: simulate(GIVEN, "0.1*t", 1.0)),
     "argument of a session": ("", ..., lambda: Session(GIVEN, Prescribed("0"), 1.0, steps=3)),
     "elements of no class": ("element", dict, lambda: ElementMachines(GIVEN, dict)),
@@ -2215,6 +2220,7 @@ group("parameters of a sweep", ParameterError, sweeping, rows, "")
 rows = {
     "unknown initial value": ("parameters", ..., {"initial.q": [1.0]}),
     "period of what does not tick": ("parameters", ..., {"friction.period": [1.0]}),
+    "signal of another rig": ("parameters", ..., {"F_a": ["t"]}),
 }
 group("parameters of a sweep", ParameterError, sweeping, rows)
 rows = {

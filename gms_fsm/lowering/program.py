@@ -300,6 +300,12 @@ def _names(callables: Mapping[str, Callable[[float], float]]) -> dict[str, Any]:
 def _jolts(plan: ProgramPlan) -> dict[str, Any]:
     """Return what a run has to know about impulses, and about velocities that jump."""
     read = plan.read
+    if (count := len(read.system.events)) > MOST_EVENTS:
+        raise ParameterError(
+            f"its charts wait for {count} events",
+            place=f"system {read.system.name!r}",
+            advice=f"at most {MOST_EVENTS} are told apart; let edges read a number instead",
+        )
     kinds = [_kind(plan, bank, edge) for bank in read.banks for edge in bank.edges]
     held = [bank for bank in read.banks if bank.chart.locks or bank.chart.sets_velocity]
     velocities = [name for bank in held for name in bank.velocities]
@@ -324,7 +330,7 @@ def _kind(plan: ProgramPlan, bank: Bank, edge: ContactEdge) -> int:
         kind |= CHANGES_FORCES
     for k, event in enumerate(plan.read.system.events):
         if event in names_in(edge.guard):
-            kind |= EVENT << min(k, MOST_EVENTS - 1)
+            kind |= EVENT << k
     return kind
 
 
