@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from contextlib import suppress
 
 from gms_fsm.charts.chart import Chart
@@ -10,9 +9,7 @@ from gms_fsm.charts.files.tables import ChartTable, ParameterTable
 from gms_fsm.charts.nesting import is_age
 from gms_fsm.charts.parameters import QUANTITIES, Parameter, adapted
 from gms_fsm.errors import GMSError
-from gms_fsm.language import Call, Name, Negative, Node, Number, relations
-
-_NUMBER = re.compile(r"(?<![\w.])(?<!\*\*)(?<!\*\* )(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])")
+from gms_fsm.language import Call, Name, Negative, Node, Number, numbers_named, relations
 
 
 def named_constants(chart: Chart) -> tuple[Chart, dict[str, float]]:
@@ -40,19 +37,13 @@ def named_constants(chart: Chart) -> tuple[Chart, dict[str, float]]:
 
 def _named(chart: Chart, i: int) -> tuple[Chart, dict[str, float]]:
     """Return the same for one edge, as it is written."""
-    table, values = ChartTable.of(chart), dict[str, float]()
+    table = ChartTable.of(chart)
     edge, units = table.transitions[i], _units(chart, chart.nesting.transitions[i].name)
-
-    def name_of(found: re.Match[str]) -> str:
-        if not (value := float(found[0])):
-            return found[0]
-        name = f"{edge.name}_at{f'_{len(values) + 1}' if values else ''}"
-        values[name] = value
-        meaning, unit = f"{found[0]} in {edge.guard}", units.get(value, "")
+    guard, numbers = numbers_named(edge.guard, f"{edge.name}_at")
+    values = {name: float(text) for name, text in numbers.items()}
+    for name, text in numbers.items():
+        meaning, unit = f"{text} in {edge.guard}", units.get(values[name], "")
         table.parameters.append(ParameterTable(name=name, unit=unit, meaning=meaning))
-        return name
-
-    guard = _NUMBER.sub(name_of, edge.guard)
     table.transitions[i] = edge.model_copy(update={"guard": guard})
     return (table.build(Chart), values) if values else (chart, {})
 

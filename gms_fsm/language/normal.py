@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -25,6 +26,8 @@ from gms_fsm.language.tree import (
     rebuilt,
     walk,
 )
+
+_NUMBER = re.compile(r"(?<![\w.])(?<!\*\*)(?<!\*\* )(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])")
 
 
 def clauses(condition: Condition) -> tuple[Condition, ...]:
@@ -186,6 +189,43 @@ def comparisons(part: Split) -> tuple[Comparison, ...]:
 
 
 # --------------------------------------------------------------------------- corners and jumps
+def numbers_named(text: str, name: str) -> tuple[str, dict[str, str]]:
+    """Return a text with names where it had numbers, and these.
+
+    Zeros stay, and exponents.
+
+    Parameters
+    ----------
+    text : str
+        A formula or a guard.
+    name : str
+        The first name; the others end in ``_2``, ``_3`` ...
+
+    Returns
+    -------
+    str
+        The text.
+    dict of str to str
+        What stood there, by name.
+
+    Examples
+    --------
+    >>> from gms_fsm.language import numbers_named
+    >>> numbers_named("0.2*sin(3*t)**2", "u_is")
+    ('u_is*sin(u_is_2*t)**2', {'u_is': '0.2', 'u_is_2': '3'})
+    """
+    numbers = dict[str, str]()
+
+    def name_of(found: re.Match[str]) -> str:
+        if not float(found[0]):
+            return found[0]
+        own = f"{name}_{len(numbers) + 1}" if numbers else name
+        numbers[own] = found[0]
+        return own
+
+    return _NUMBER.sub(name_of, text), numbers
+
+
 def rough_points(value: Value) -> tuple[Value, ...]:
     """Return every u whose sign decides a corner or a jump of `value`, innermost first.
 

@@ -27,6 +27,7 @@ from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.recording.counted import LARGE, CountTables
 from gms_fsm.run.repeated.beginnings import (
+    as_numbers,
     initial_size,
     periods_of,
     signals_given,
@@ -143,11 +144,18 @@ def sweep(
     if begin.settings.engine == "compiled":
         check_llvmlite()
     signals = signals_given(what, given)
-    its = with_signals(what, {name: each[0] for name, each in signals.items()})
-    first = begin.start(its)  # errors common to all runs are raised once, here
+    one = {name: each[0] for name, each in signals.items()}
+    first = begin.start(with_signals(what, one))  # errors common to all runs are raised here
+    what, numbers = as_numbers(what, signals, (first.t_start, first.t_end))
+    if numbers:
+        one = {name: each for name, each in one.items() if name not in numbers}
+        first = begin.start(with_signals(what, one))
     begin = begin.counting(first)
     values = _values(first, given, signals)
     runs = len(next(iter(values.values())))
+    columns = {name: each for name, each in values.items() if name not in numbers}
+    for each in numbers.values():
+        columns |= each
     if executor is not None and not hasattr(executor, "submit"):
         raise ParameterError(
             "it must be an executor, for example ProcessPoolExecutor(4) of concurrent.futures",
@@ -167,7 +175,7 @@ def sweep(
         try:
             with _interrupts_deferred():
                 for chunk in chunks:
-                    part = {key: array[chunk.start : chunk.stop] for key, array in values.items()}
+                    part = {key: array[chunk.start : chunk.stop] for key, array in columns.items()}
                     try:
                         task = executor.submit(_run_chunk, what, begin, part, name)
                     except Exception as error:

@@ -14,6 +14,7 @@ import pytest
 
 from gms_fsm import Body, Contact, Prescribed, Slider, Sweep, System, Trace, simulate, sweep
 from gms_fsm.charts import CHARTS
+from gms_fsm.run.repeated.beginnings import as_numbers
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in, value_in, varied
 from tests.corpus import FAILING, FEW, QUICK, each, in_turn, outcome, run
@@ -135,9 +136,14 @@ PUSHED = System(
 )
 
 
+RAMPS: list[Any] = [[(0, 0), (1, 3)], ([0.0, 0.5, 2.0], [1.0, 3.0, 0.0]), [(0, 2), (1, 2)]]
+SINES = [f"{a}*sin({b}*t)**2 - seed*t/{b}" for a, b in ((3.3, 4.1), (2.9, 3.7), (4.7, 5.3))]
+PULSES = [f"3 - 4*exp(-((t - {t})/0.01)**2)" for t in (0.7, 0.9, 1.1)]
+
+
 @pytest.mark.parametrize("engine", sorted({"ifelse", FASTEST}))
-def test_signals_and_seeds_vary_by_name(engine: str, tmp_path: Path) -> None:
-    given: list[Any] = [[(0, 0), (1, 3)], ([0.0, 0.5, 2.0], [1.0, 3.0, 0.0]), [(0, 2), (1, 2)]]
+@pytest.mark.parametrize("given", [RAMPS, SINES], ids=["records", "one text"])
+def test_signals_and_seeds_vary_by_name(given: list[Any], engine: str, tmp_path: Path) -> None:
     seeds = [1.0, 2.0, 2.0]
     found = sweep(PUSHED, 2.0, {"signals.u": given, "numbers.seed": seeds}, engine=engine)
     for k in range(3):
@@ -146,6 +152,16 @@ def test_signals_and_seeds_vary_by_name(engine: str, tmp_path: Path) -> None:
         assert found.ends["mass.x"][k] == one.body("mass").x[-1] != 0.0
         assert found.transition_count[k] == len(one.transitions)
     same(Sweep.load(found.save(tmp_path / "runs.npz")), found)
+
+
+def test_texts_that_differ_in_numbers_are_one_program() -> None:
+    def found(texts: list[str]) -> dict[str, Any]:
+        signals = {"signals.u": np.array(texts, dtype=object)}
+        return as_numbers(mounted(PUSHED), signals, (0.0, 2.0))[1]
+
+    names = [f"numbers.u__at{end}" for end in ("", "_2", "_3")]
+    assert list(found(SINES)["signals.u"]) == names
+    assert found([*SINES, "t"]) == found(PULSES) == found(["abs(2*t)", "abs(3*t)"]) == {}
 
 
 @pytest.mark.parametrize("name", ["v", "F_a"])

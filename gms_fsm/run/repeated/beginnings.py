@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import FloatArray, Parameter, checked_scalar
 from gms_fsm.errors import GMSError, ParameterError, cut
 from gms_fsm.gradients.directions import INITIAL, initial_places
+from gms_fsm.language import names_in, numbers_named, parse_value, rough_points
+from gms_fsm.lowering.pulses import waking_times
 from gms_fsm.run._swept import LONGEST
 from gms_fsm.run.problem import Problem
 from gms_fsm.systems.mounted import Mounted, mounted
-from gms_fsm.systems.numbers import known_in
+from gms_fsm.systems.numbers import NUMBERS, known_in
 from gms_fsm.systems.parts import Sampled
 from gms_fsm.systems.signals import Formula, as_signal
+from gms_fsm.systems.system import System
 
 PERIOD = ".period"
 SIGNALS = "signals"  # the owner of those of a system
@@ -126,6 +129,43 @@ def with_signals(what: Mounted, given: Mapping[str, Any]) -> Mounted:
         return what
     names = signals_of(what)
     return what.driven({**what.rig.signals, **{names[each]: u for each, u in given.items()}})
+
+
+def as_numbers(
+    what: Mounted, signals: Mapping[str, NDArray[Any]], span: tuple[float, float]
+) -> tuple[Mounted, dict[str, dict[str, NDArray[Any]]]]:
+    """Return the same with numbers in texts that differ in numbers only, and those of all runs.
+
+    All runs are one program then. Bodies that move as given begin with another velocity.
+    """
+    names, found = signals_of(what), dict[str, dict[str, NDArray[Any]]]()
+    system = what.system
+    for name, texts in signals.items():
+        if any(body.driven for body in system.bodies):
+            break
+        if not all(isinstance(each, str) and _is_smooth(each, system, span) for each in texts):
+            continue
+        pairs = [numbers_named(text, f"{names[name]}__at") for text in texts]
+        pattern, first = pairs[0]
+        if first and len({text for text, _ in pairs}) == 1:
+            found[name] = {
+                f"{NUMBERS}.{own}": np.array([float(numbers[own]) for _, numbers in pairs])
+                for own in first
+            }
+            numbers = {own: float(text) for own, text in first.items()}
+            given: Any = {**system.signals, names[name]: pattern}
+            system = replace(system, signals=given, numbers={**system.numbers, **numbers})
+    return (mounted(system) if found else what), found
+
+
+def _is_smooth(text: str, system: System, span: tuple[float, float]) -> bool:
+    """Return whether steps need not be told where a signal bends, jumps or wakes."""
+    try:
+        tree = parse_value(text, ["t", *system.numbers])
+    except GMSError:
+        return False  # its run says so
+    rests = names_in(tree) <= {"t"} and waking_times(tree, *span)
+    return not rough_points(tree) and not rests
 
 
 def told(values: NDArray[Any]) -> NDArray[Any]:
