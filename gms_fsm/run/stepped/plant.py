@@ -88,6 +88,10 @@ class Plant:
         self.told = frozenset[SystemSwitch]()
         self.last: LastSample | None = None
         self._sees_ends = _sees_ends(self.start)
+        # Where the first inputs matter: what entries compute, and whether a lock holds at once.
+        self._enters = any(each.chart.assigned() for each in system.machines) or any(
+            body.driven for body in system.bodies
+        )
         self._steps = self.start.program.plan.steps
         self._knots: tuple[float, list[float]] = -np.inf, []  # up to when, and they
         if t_end is not None:
@@ -183,7 +187,7 @@ class Plant:
     ) -> tuple[SystemSwitch, ...]:
         """Do what `_advanced` does for the first sample, one without length, or one in parts."""
         sample, b, lost = self._sample, self.memory.buffers, tuple[SystemSwitch, ...]()
-        if b.memory.phase == loop.START:
+        if b.memory.phase == loop.START and self._enters:
             self._enter(first if end > t else last)
         knots = self.knots(t, end) if self._in_parts else []
         sample.until = end
