@@ -19,8 +19,7 @@ from gms_fsm.language import Number, Value, names_in, renamed, spell
 from gms_fsm.lowering.generated import SIGNALS, CarefulText, ieee, load
 from gms_fsm.lowering.printing.lines import CodeLine, indented
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
-from gms_fsm.lowering.printing.locks import ENDLESS
-from gms_fsm.lowering.printing.names import computed_names
+from gms_fsm.lowering.printing.names import ENDLESS, computed_names
 from gms_fsm.lowering.printing.plan import ProgramPlan
 from gms_fsm.lowering.printing.scale_text import HELPERS, scale_text
 from gms_fsm.systems.reading.assembly import CURVE_LOAD, Bank, of

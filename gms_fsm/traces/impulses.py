@@ -8,7 +8,7 @@ import numpy as np
 
 from gms_fsm.language import evaluate
 from gms_fsm.lowering.observing import observe
-from gms_fsm.lowering.printing.locks import ENDLESS
+from gms_fsm.lowering.printing.names import ENDLESS
 from gms_fsm.systems.reading.assembly import Bank, of
 
 if TYPE_CHECKING:

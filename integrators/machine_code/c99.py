@@ -255,6 +255,8 @@ def _loops(body: Iterable[Statement]) -> Iterator[For]:
 class CWriter:
     """Writes one function."""
 
+    NARROW = True  # whether loops declare counters of their own, and blocks what branches set
+
     def __init__(
         self,
         function: TypedFunction,
@@ -271,10 +273,14 @@ class CWriter:
         self.before = dict[int, list[Local]]()  # what is declared before them
         self.once = assigned_once(function.body)
         self.unread = self._unread()
-        found = declarations(function.body)
-        self.here = {at: names - self.unread for at, names in found.items()}
-        later = frozenset[str]().union(*self.here.values())
-        self.first = [v for v in function.variables if v.name not in self.unread | later]
+        found = declarations(function.body, narrow=self.NARROW)
+        used = [each for each in function.variables if each.name not in self.unread]
+        self.here = {at: names - self.unread for at, names in found.at.items()}
+        self.before = {
+            at: [u for u in used if u.name in names] for at, names in found.before.items()
+        }
+        later = frozenset[str]().union(*found.at.values(), *found.before.values())
+        self.first = [each for each in used if each.name not in later]
 
     def _unread(self) -> set[str]:
         """Return the variables that are only written, which compilers warn of."""
@@ -301,7 +307,7 @@ class CWriter:
         left = self.first
         for statement in function.body:
             inside = mentioned((statement,))
-            self.before[id(statement)] = [each for each in left if each.name in inside]
+            self.before.setdefault(id(statement), []).extend(u for u in left if u.name in inside)
             left = [each for each in left if each.name not in inside]
         self.read.clear()
         body = self.block(function.body, 1)
@@ -311,14 +317,14 @@ class CWriter:
         lines += [f"    (void){self.name(each)};" for each in unused]
         return "\n".join([*lines, *body, "}", ""])
 
-    def _declarations(self, statement: Statement) -> Iterator[str]:
+    def _declarations(self, statement: Statement, depth: int) -> Iterator[str]:
         """Write the declarations of locals that get their values inside a statement."""
         locals_ = self.before.get(id(statement), [])
         types = [*map(self.declared, locals_)]
         for type_ in dict.fromkeys(types):
             own = [self.name(v.name) for v, its in zip(locals_, types, strict=True) if its == type_]
             star = ", *" if type_.endswith("*") else ", "
-            yield f"    {type_}{star.join(own)};"
+            yield f"{'    ' * depth}{type_}{star.join(own)};"
 
     def declared(self, local: Local) -> str:
         """Write the type of a local."""
@@ -344,7 +350,7 @@ class CWriter:
         return [
             line
             for each in body
-            for line in (*self._declarations(each), *self.statement(each, depth))
+            for line in (*self._declarations(each, depth), *self.statement(each, depth))
         ]
 
     def statement(self, statement: Statement, depth: int) -> list[str]:
@@ -372,7 +378,8 @@ class CWriter:
                 return [f"{space}{self.value(call)};"]
             case If(test=test, body=body, orelse=orelse):
                 lines = [f"{space}if ({self.value(test)}) {{", *self.block(body, depth + 1)]
-                if len(orelse) == 1 and isinstance(orelse[0], If):
+                chained = len(orelse) == 1 and isinstance(orelse[0], If)
+                if chained and not self.before.get(id(orelse[0])):
                     first, *rest = self.statement(orelse[0], depth)
                     return [*lines, f"{space}}} else {first.lstrip()}", *rest]
                 if orelse:

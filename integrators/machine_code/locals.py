@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from integrators.machine_code.tree import (
     Assign,
     AssignMany,
     Expr,
     For,
+    If,
     Invoke,
     Load,
     Local,
@@ -31,40 +32,74 @@ from integrators.machine_code.tree import (
 
 
 # --------------------------------------------------------------------------- declarations
-def declarations(body: tuple[Statement, ...]) -> dict[int, frozenset[str]]:
-    """Return by the `id` of statements the locals that live only from there to a block's end.
+def declarations(body: tuple[Statement, ...], *, narrow: bool = True) -> Declarations:
+    """Return where the locals of a function can be declared; the others live in all of it.
+
+    If not `narrow`, only where one statement gives them their value.
 
     Examples
     --------
     >>> x = Local("f", "x")
     >>> body = (Assign(x, Local("f", "u")), Return((x,)))
-    >>> declarations(body) == {id(body[0]): frozenset({"x"})}
+    >>> declarations(body).at == {id(body[0]): frozenset({"x"})}
     True
     """
-    found: dict[int, frozenset[str]] = {}
-    _declare(body, mentioned(body), found)
+    found = Declarations({}, {})
+    _declare(body, mentioned(body), found, narrow=narrow)
     return found
 
 
+class Declarations(NamedTuple):
+    """By the `id` of statements the locals that live only from there to a block's end."""
+
+    at: dict[int, frozenset[str]]  # the statement gives them their value
+    before: dict[int, frozenset[str]]  # all branches of the statement do
+
+
 def _declare(
-    block: tuple[Statement, ...], free: frozenset[str], found: dict[int, frozenset[str]]
+    block: tuple[Statement, ...], free: frozenset[str], found: Declarations, *, narrow: bool
 ) -> None:
     named = [mentioned((each,)) & free for each in block]
     counts = Counter(name for names in named for name in names)
+    counting = [
+        {each.target.name} if narrow and isinstance(each, For) else set[str]() for each in block
+    ]
+    elsewhere = {name for names, own in zip(named, counting, strict=True) for name in names - own}
     seen = frozenset[str]()
     for statement, names in zip(block, named, strict=True):
         alone = frozenset(name for name in names if counts[name] == 1)
         read = frozenset(u.name for expr in expressions_of(statement) for u in locals_in(expr))
         set_here = frozenset(each.name for each in targets_of(statement))
         if isinstance(statement, For):
-            set_here &= alone
+            set_here &= alone | (names - elsewhere)
         if new := (set_here & names) - read - seen:
-            found[id(statement)] = new
-        seen |= names
-        inner = blocks_of(statement)
+            found.at[id(statement)] = new
+        inner, inside = blocks_of(statement), frozenset[str]()
         for k, each in enumerate(inner):
             others = mentioned(*(u for j, u in enumerate(inner) if j != k))
-            _declare(each, alone - read - set_here - others, found)
+            own = alone - read - set_here - others
+            _declare(each, own, found, narrow=narrow)
+            inside |= own
+        later = names - new - seen - inside
+        if narrow and (bare := frozenset(name for name in later if _sets(statement, name))):
+            found.before[id(statement)] = bare
+        seen |= names if not narrow else names & elsewhere
+
+
+def _sets(statement: Statement, name: str) -> bool:
+    """Return whether all branches of a statement give a local a value before they read it."""
+    match statement:
+        case Assign(value=value) | AssignMany(call=value):
+            own = any(each.name == name for each in targets_of(statement))
+            return own and all(each.name != name for each in locals_in(value))
+        case If(test=test, body=body, orelse=orelse):
+            if any(each.name == name for each in locals_in(test)):
+                return False
+            parts = [
+                [each for each in part if name in mentioned((each,))] for part in (body, orelse)
+            ]
+            return all(part and _sets(part[0], name) for part in parts)
+    return False
 
 
 def mentioned(*blocks: tuple[Statement, ...]) -> frozenset[str]:

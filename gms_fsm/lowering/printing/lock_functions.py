@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from gms_fsm.lowering.printing.forces import ForceWriter
 from gms_fsm.lowering.printing.lines import CodeLine
-from gms_fsm.lowering.printing.locks import ENDLESS
 
 
 class LockFunctions(ForceWriter):
@@ -17,7 +16,7 @@ class LockFunctions(ForceWriter):
             if bank.locked:
                 lines.append(CodeLine(f"if jolt[{self.machine(bank.index, '0')}] == LET_GO:"))
                 for force, v in zip(bank.forces, bank.velocities, strict=True):
-                    text = f"    {self.local(force)} = {self.local(v)} * {ENDLESS}"
+                    text = f"    {self.local(force)} = {self.local(v)} * ENDLESS"
                     lines.append(CodeLine(text, frozenset({v})))
         return lines
 

@@ -32,8 +32,6 @@ from gms_fsm.systems.system import Body
 
 # A pivot under this part of the diagonal is one that rounding has left of zero.
 DEPENDENT = 1e-9
-# A force without limit, in units of an impulse; squared it is still finite.
-ENDLESS = 1e100
 LAST_PLACES = 1e-15  # a difference of this part of what it is made from is rounding
 # A velocity, or a jump of one, that counts as none: parts of the speeds of the bodies, of how far
 # these come in all the time at their rates, and of their tolerances.
@@ -393,7 +391,7 @@ class Locks:
                 CodeLine(f"if l_{r} == 0.0 and ({self.locking(r)}):"),
                 CodeLine(f"    u = {self.writer.spell(tree)}", reads),
                 CodeLine(f"    if abs(u) > {DEPENDENT} * ({size}):", reads),
-                CodeLine(f"        {force} = {force} + u * {ENDLESS}"),
+                CodeLine(f"        {force} = {force} + u * ENDLESS"),
             ]
         return lines
 
@@ -473,7 +471,7 @@ class Locks:
                 if edge.source not in bank.locked or not names_in(edge.guard) & {*bank.forces}:
                     continue
                 pushed = {
-                    force: f"(hold_{r} * {ENDLESS})"
+                    force: f"(hold_{r} * ENDLESS)"
                     for force, r in zip(bank.forces, first, strict=True)
                 }
                 guard = spell(edge.guard, rename=dict(self.writer.names.texts) | pushed)

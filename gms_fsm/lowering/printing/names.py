@@ -13,8 +13,10 @@ from gms_fsm.lowering.layout import sizes_of
 from gms_fsm.systems.reading.assembly import Assembly, Bank
 from integrators import FOR_A_GUARD, FOR_A_SIGN, JUMPED, LET_GO, WAITING
 
+# A force without limit, in units of an impulse; squared it is still finite.
+ENDLESS = 1e100
 # The loop's numbers: whose velocity has jumped, and why a comparison is watched.
-MARKS = {"JUMPED": JUMPED, "LET_GO": LET_GO}
+MARKS = {"JUMPED": JUMPED, "LET_GO": LET_GO, "ENDLESS": ENDLESS}
 REASONS = {"FOR_A_SIGN": FOR_A_SIGN, "FOR_A_GUARD": FOR_A_GUARD, "WAITING": WAITING}
 # Names that the text uses itself. What a user calls like one of them is called otherwise there.
 TEXT = frozenset(

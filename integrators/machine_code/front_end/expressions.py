@@ -232,7 +232,8 @@ def operation(work: Work, op: ast.operator, a: Expr, b: Expr) -> Expr:
     if isinstance(b, Const) and b.value == 0 and sign in ("//", "%"):
         raise work.error("division by zero")
     if isinstance(a, Const) and isinstance(b, Const):
-        named = sign == "|" and a.name and b.name  # names of bits say more than their sum
+        # Names of bits say more than their sum; -2 - ARREST is a refused edge.
+        named = b.name and (sign == "-" or (sign == "|" and a.name))
         if not (named or (sign == "/" and b.value == 0.0)):
             return _constant(compute(a.value, b.value))
     return Op(a.kind, sign, (a, b))

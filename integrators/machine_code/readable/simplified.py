@@ -204,6 +204,8 @@ class _Certain:
                     return right if holds(first) == (op == "and") else Const("b", op == "or")
             case Op(op="|", operands=(Const(name=one), Const(name=other))) if one and other:
                 return expr
+            case Op(op="-", operands=(Const(), Const(name=name))) if name:
+                return expr
         if isinstance(expr, Const | Global | AddressOf) or not _pure(expr):
             return expr
         values = of(name, expr)

@@ -123,6 +123,8 @@ def script_number(value: float) -> str:
 class _Script(CWriter):
     """Writes one function."""
 
+    NARROW = False  # that is longer
+
     def __init__(
         self,
         function: TypedFunction,
