@@ -138,12 +138,16 @@ def plain_form(element: NamedFriction, dt: str = "dt") -> PlainForm:
     guards: list[Statement] = [_let(each) for each in steady]
     first, inside = element.placed(guard_reads, moves=True)
     guards += map(_let, first)
+    moved = any(edge.steps for state in states for edge in state.edges)
+    known = [] if moved else first  # that has its value still
     branches: list[tuple[Statement, ...]] = []
     for state, lets in zip(states, inside, strict=True):
         chain = Guards(tuple((edge, _taken(edge, len(states) > 1)) for edge in state.edges))
         branches.append((*map(_let, lets), chain) if state.edges else ())
     guards += [ByState(tuple(branches))] if any(branches) else []
     first, inside = element.placed(flow_reads, moves=True)
+    first = [each for each in first if each not in known]
+    inside = [[each for each in row if each not in known] for row in inside]
     same = len({state.force.tree for state in states}) == 1
     rates = tuple(each.rate for each in element.variables)
     flows: list[Statement] = [*map(_let, first), Declare(rates if same else (*rates, part))]
