@@ -126,13 +126,13 @@ def test_random_calls_have_the_bits_of_the_engine(c: Library) -> None:
 
 
 def test_a_limit_of_steps_and_the_state_after_an_error(c: Library) -> None:
-    one, other = c.begun(), c.begun()
+    one, other, public = c.begun(), c.begun(), c.State.engine.offset
     for v0, v1 in PAIRS:
-        before = bytes(one)
+        before = bytes(one)[:public]
         code = c.advance(one, v0, v1, 0.1, max_steps=1)
         if code != 0:
             assert b"more steps than max_steps" in c.message(code)
-            assert bytes(one) == before
+            assert bytes(one)[:public] == before
             assert c.advance(one, v0, v1, 0.1) == 0
         assert c.advance(other, v0, v1, 0.1) == 0
         assert bytes(one)[8:] == bytes(other)[8:] or one.F == other.F
