@@ -5,6 +5,7 @@ Whatever was run before in the same memory, whatever is recorded; errors too.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,20 @@ import pytest
 
 from gms_fsm import (
     GMS,
+    Body,
     ChartModel,
+    Contact,
     GMSParameters,
     ParameterError,
     Prepared,
     Prescribed,
     PulledSlider,
+    System,
     Trace,
     prepare,
     simulate,
 )
+from gms_fsm.charts import CHARTS
 from gms_fsm.errors import GMSError
 from gms_fsm.identification.play_bank import SPRING_WITH_PLAY
 from gms_fsm.systems.mounted import mounted
@@ -140,3 +145,13 @@ def test_calls_between_further_functions_arrive() -> None:
 def test_what_is_no_number_for_it_is_refused(mass: Any) -> None:
     with pytest.raises(ParameterError, match="mass"):
         prepare(*PULLED, 1.0, engine=FASTEST)(mass=mass)
+
+
+def test_a_motion_without_a_scale_that_is_pushed_by_an_input_has_the_bits() -> None:
+    pad = Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.1})
+    mass = Body("mass", inertia="m", force="u")
+    sled = System("sled", bodies=(mass,), contacts=(pad,), inputs=("u",), numbers={"m": 1.0})
+    pushed = sled.with_inputs({"u": "2*sin(3*t)"})
+    heavy = simulate(replace(pushed, numbers={"m": 2.0}), 3.0, engine="ifelse")
+    end = prepare(pushed, 3.0, engine=FASTEST).end({"numbers.m": 2.0})
+    assert end.y[0] == heavy.body("mass").x[-1]
