@@ -23,10 +23,10 @@ from plots.page.live import play
 from tests.helpers import FASTEST
 
 # What the engine of a page finds with some numbers, as base64 of floats.
-FOUND = """(sets) => sets.map((numbers) => {
+FOUND = """(sets, engines = (globalThis.engines ??= [])) => sets.map((numbers) => {
     for (const dial of dials.values()) setValue(dial, dial.given.value);
     for (const [name, u] of Object.entries(numbers)) setValue(dials.get(name), u);
-    const found = engineNow().run(wordsNow());
+    const found = (engines[live.number] ??= new Engine(ENGINES[live.number])).run(wordsNow());
     const text = (values) => {
         const bytes = new Uint8Array(values.slice().buffer), letters = [];
         for (let k = 0; k < bytes.length; k += 8192)

@@ -205,14 +205,15 @@ document.addEventListener("keydown", pressed);
 for (const button of $$("#controls button")) button.addEventListener("click", actions[button.id]);
 
 // ------------------------------------------------------------------ the scrubber, in time or in rows
+const TICKS = 2000; // places
 let inTime = true;
 function setScale(scale) {
   inTime = scale === "t";
   const scrubber = $("#scrubber"), { min, max } = inTime ? whole : { min: 0, max: last };
   Object.assign(scrubber, { min, max, step: inTime ? "any" : 1 });
-  const at = (k) => ((inTime ? frames.t[k] - min : k) / Math.max(max - min, Number.MIN_VALUE)) * 1000;
-  $("#ticks").setAttribute("viewBox", "0 0 1000 1");
-  const marks = [...new Set(events.map((k) => at(k).toFixed(1)))]; // as many as can be told apart
+  const at = (k) => Math.round(((inTime ? frames.t[k] - min : k) / Math.max(max - min, Number.MIN_VALUE)) * TICKS);
+  $("#ticks").setAttribute("viewBox", `0 0 ${TICKS} 1`);
+  const marks = [...new Set(events.map(at))]; // as many as can be told apart
   $("#ticks path").setAttribute("d", marks.map((x) => `M${x} 0V1`).join(""));
   $("#ticks .pinned").setAttribute("d", pinned === null ? "" : `M${at(pinned)} 0V1`);
   scrubber.value = inTime ? frames.t[frame] : frame;

@@ -66,7 +66,7 @@ class TimePlots {
     const plot = new uPlot({
       width: 300, height: 100, padding: [7, GAP, isLast ? 2 : 7, 0].map((u) => u * large), pxAlign: false, legend: { show: false },
       scales: { x: { time: false } },
-      axes: [isLast ? { ...axis, size: TIME_AXIS * large, space: 50 * large, values: marks(10 ** TIME_POWER) } : { ...axis, size: 0, values: (u, splits) => splits.map(() => "") }, { ...axis, size: AXIS * large, values: marks(10 ** power), space: (presenting.on ? 14 : 20) * large, ...(bare && { values: () => [""], splits: () => [0] }) }],
+      axes: [isLast ? { ...axis, size: TIME_AXIS * large, space: 50 * large, values: marks(10 ** TIME_POWER) } : { ...axis, size: 0, values: (u, splits) => splits.map(() => null) }, { ...axis, size: AXIS * large, values: marks(10 ** power), space: (presenting.on ? 14 : 20) * large, ...(bare && { values: () => [""], splits: () => [0] }) }],
       series: [{}, ...lines.map(({ stroke, dash = [], width = 1.3 }) => ({
         stroke: ink(stroke), dash: dash.map((u) => u * large), width: width * large, points: { size: 4 * large }, ...(step && { paths: uPlot.paths.stepped({ align: 1 }) }),
       }))],

@@ -1,6 +1,5 @@
 "use strict";
-// A run computed here: the memory of an engine that gms-fsm has printed. This text also runs in a worker, by itself.
-const STEPS_AT_ONCE = 2000; // between two looks at the clock
+// A run computed in the page's worker: the memory of an engine that gms-fsm has printed.
 const GROWING = { // columns by what there is one entry of
   rows: ["rows_t", "rows_y", "rows_microstep", "rows_mode", "table", "shown"],
   firings: ["log_t", "log_machine", "log_edge", "log_numbers"],
@@ -48,30 +47,19 @@ class Engine {
 
   get isFull() { return { rows: this.word("row") + 1 >= this.rooms.rows, firings: this.word("firings") >= this.rooms.firings }; }
 
-  // A run with other numbers: [word, value] pairs. What it finds lies in the memory until the next run. After `most` ms it
-  // is given up, and there is no result.
-  run(numbers, most = Infinity) {
-    const { codes } = this.known, until = performance.now() + most;
-    let event = this.begin(numbers);
-    while (event === codes.ROWS) {
-      event = this.functions.record(STEPS_AT_ONCE, 0);
-      if (event !== codes.ROWS) break;
-      if (performance.now() > until) return null;
+  // A run with other numbers: [word, value] pairs. What it finds lies in the memory until the next run.
+  run(numbers) {
+    for (;;) {
+      this.F.set(this.first);
+      for (const [word, value] of numbers) this.F[this.block + word] = value;
+      this.F[this.block + this.known.places.time_scale] = this.functions.adapt();
+      const event = this.functions.record(Infinity, 0);
+      if (event !== this.known.codes.ROWS) return this.found(event);
       const { rows, firings } = this.isFull;
-      if (!rows && !firings) continue;
       if (rows) this.rooms.rows *= 2;
       if (firings) this.rooms.firings *= 2;
-      this.build();
-      event = this.begin(numbers); // again from the start: growing is rare, copying would be a second way
+      this.build(); // and again from the start: growing is rare, copying would be a second way
     }
-    return this.found(event);
-  }
-
-  begin(numbers) {
-    this.F.set(this.first);
-    for (const [word, value] of numbers) this.F[this.block + word] = value;
-    this.F[this.block + this.known.places.time_scale] = this.functions.adapt();
-    return this.known.codes.ROWS;
   }
 
   found(event) {

@@ -1,21 +1,19 @@
 "use strict";
 // The live page: a change of a number computes the run again, and the page shows its rows. The run as it was written stays
-// behind it. A run that takes long is computed in a worker, and of the changes meanwhile the latest wins.
-const PATIENCE = 80; // ms that a run may hold up the page
-const AT_FIRST = 250; // of the first run, which is slower: the worker would begin it again, as slowly
+// behind it. Runs are computed in a worker, beside the drawing; of the changes meanwhile the latest wins.
+const LATE = 200; // ms, after which a run is said to take long
 const SETTLED = 400; // ms without a change, after which the address is written and what changed is read aloud
-const IN_WORKER = `
+const THOUSANDS = new Intl.NumberFormat("en");
+const RUNNER = `
 const engines = [];
-onmessage = ({ data: { id, number, numbers } }) => {
+onmessage = ({ data: { number, numbers } }) => {
   const begin = performance.now(), found = kept((engines[number] ??= new Engine(ENGINES[number])).run(numbers));
   const buffers = Object.values(found).filter((each) => each instanceof Float64Array).map(({ buffer }) => buffer);
-  postMessage({ id, found, took: performance.now() - begin }, buffers);
+  postMessage({ found, took: performance.now() - begin }, buffers);
 };
 `;
 
-const live = { number: 0, engines: [], slow: false, asked: 0, busy: false, waiting: null, took: 0 };
-const engineOf = (number) => (live.engines[number] ??= new Engine(ENGINES[number]));
-const engineNow = () => engineOf(live.number);
+const live = { number: 0, busy: false, waiting: null, took: 0, worker: inWorker(RUNNER) };
 const variant = () => data.live.variants[live.number];
 
 // ------------------------------------------------------------------ runs
@@ -25,19 +23,6 @@ function wordsNow() {
   return [...dials.values()].filter((dial) => !dial.parts && dial.value !== dial.given.value).flatMap(({ name, value }) => words[name].map((word) => [word, value]));
 }
 
-// Computes a run, here or in the worker, and hands it over with the number of its engine.
-function compute(numbers, then, patience = PATIENCE) {
-  const { number } = live;
-  if (!live.slow) {
-    const begin = performance.now(), found = engineNow().run(numbers, patience);
-    live.took = performance.now() - begin;
-    if (found) { then(found, number); return; }
-    live.slow = true;
-  }
-  live.waiting = { number, numbers, then };
-  if (!live.busy) askWorker();
-}
-
 // A worker that has the engines, and does what a text says.
 function inWorker(text, heard) {
   const worker = new Worker(URL.createObjectURL(new Blob([$("#engine").textContent, text], { type: "text/javascript" })));
@@ -45,28 +30,32 @@ function inWorker(text, heard) {
   return worker;
 }
 
-function askWorker() {
+// Computes a run, and hands it over with the number of its engine.
+function compute(numbers, then) {
+  live.waiting = { number: live.number, numbers, then };
+  if (!live.busy) ask();
+}
+
+function ask() {
   const { number, numbers, then } = live.waiting;
-  Object.assign(live, { waiting: null, busy: true, asked: live.asked + 1 });
-  $("#numbers")?.classList.add("busy");
-  live.worker ??= inWorker(IN_WORKER);
+  Object.assign(live, { waiting: null, busy: true });
+  const late = setTimeout(() => $("#numbers").classList.add("busy"), LATE);
   live.worker.onmessage = ({ data: { found, took } }) => {
-    Object.assign(live, { busy: false, took, slow: took > PATIENCE / 2 });
-    $("#numbers")?.classList.remove("busy");
+    clearTimeout(late);
+    $("#numbers").classList.remove("busy");
+    Object.assign(live, { busy: false, took });
+    if (live.waiting) ask(); // while this one is drawn
     then(found, number);
-    if (live.waiting) askWorker();
   };
-  live.worker.postMessage({ id: live.asked, number, numbers });
+  live.worker.postMessage({ number, numbers });
 }
 
 // ------------------------------------------------------------------ changes
-let frameAsked = false, settling = 0;
+let settling = 0;
 function changed() {
   for (const dial of dials.values()) dial.show();
   settle();
-  if (frameAsked) return;
-  frameAsked = true; // as often as the screen
-  requestAnimationFrame(() => { frameAsked = false; compute(wordsNow(), showRun); });
+  compute(wordsNow(), showRun);
 }
 
 // A start in a state that holds a velocity, and it moves: Python refuses it, too.
@@ -93,11 +82,11 @@ function showRun(found, number) {
   const wrong = movesLocked(runs[0]);
   if (wrong || $("#refused").dataset.of === "start") say($("#refused"), wrong);
   $("#refused").dataset.of = wrong ? "start" : "";
-  say($("#took"), `${runs[0].rows.toLocaleString("en")} rows, ${counted(runs[0].log.length, "transition")}, in ${live.took.toFixed(1)} ms`);
+  say($("#took"), `${THOUSANDS.format(runs[0].rows)} rows, ${counted(runs[0].log.length, "transition")}, in ${live.took.toFixed(1)} ms`);
 }
 
 function runOf(number, found, more, place) {
-  const run = new LiveRun({ ...data.live.variants[number].run, ...more }, place, engineOf(number), found);
+  const run = new LiveRun({ ...data.live.variants[number].run, ...more }, place, ENGINES[number], found);
   return Object.assign(run, { engineNumber: number });
 }
 
@@ -287,17 +276,15 @@ function reset() {
 }
 
 function beginLive() {
-  buildPanel();
-  const t = readAddress(), { number } = live;
-  live.number = 0;
   compute([], (found) => {
-    const written = kept(found), base = runOf(0, written, { label: "base run", short: "base", ghost: true }, 1);
-    live.number = number;
-    load({ ...data, runs: [runOf(0, written, { label: "this run", short: "now" }, 0), base] });
+    const base = runOf(0, found, { label: "base run", short: "base", ghost: true }, 1);
+    load({ ...data, runs: [runOf(0, found, { label: "this run", short: "now" }, 0), base] });
     if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
     if (isChanged()) changed();
-    else showRun(written, 0);
-  }, AT_FIRST);
+    else showRun(found, 0);
+  });
+  buildPanel(); // meanwhile
+  const t = readAddress();
   addEventListener("hashchange", () => {
     const t = readAddress();
     changed();
