@@ -42,8 +42,10 @@ from gms_fsm.charts.broken import BROKEN
 from gms_fsm.foundation.files import write_whole
 from plots import figures, panels
 from plots.style import INK, LINE_GREY, RC, TEXT_GREY, compared_look, ramp
+from plots.style.presets import Preset
 from plots.systems.mechanism import schematic_figure
 
+PAGE = Preset("page", 7.2, None, 9.0, 8.0, 1.2, 150.0)  # as wide as the text of a page
 FOLDER = Path(__file__).parent / "images"
 SCENARIOS = Path(__file__).parents[1] / "gms_fsm" / "scenarios"
 
@@ -113,7 +115,8 @@ def draw_figures(signed: Trace) -> None:
     row = int((sliding == 2).nonzero()[0][-1])  # two of four elements slip
     figures.save(schematic_figure(signed, row), FOLDER / "schematic.png")
     pulled = run("pulled_mass")
-    figures.save(figures.overview(pulled, title="Pulled mass"), FOLDER / "figure_overview.png")
+    with plots.preset(PAGE):
+        figures.save(figures.overview(pulled, title="Pulled mass"), FOLDER / "figure_overview.png")
     landscape = plots.landscape(pulled, 1, t=0.4, title="Pulled mass")
     figures.save(landscape, FOLDER / "figure_landscape.png")
     figures.save(plots.unfold(signed, 32.6, 32.7), FOLDER / "figure_unfold.png")

@@ -82,6 +82,9 @@ _MEANT = {
 }
 
 
+FEW = 8  # options that a message lists
+
+
 class _Verbs(TyperGroup):
     """The verbs; ``--debug`` is accepted before or after one."""
 
@@ -162,6 +165,8 @@ class _Verb(TyperCommand):
             yield f"A key of the run is changed by --set run.{keys[0]}={value}"
         if {"-o", "--output"} & {*args} and "--output" not in known:
             yield f"It prints: gms-fsm {self.name} ... > FILE"
+        elif option and len(known) <= FEW:
+            yield f"{self.name} takes {', '.join(sorted(u for u in known if u.startswith('--')))}"
 
     def _one_alone(self, args: list[str], surplus: str) -> Iterator[str]:
         """Yield what is meant by an argument after the last one that is taken."""

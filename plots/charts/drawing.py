@@ -99,11 +99,11 @@ def edge_look(sheet: ChartSheet, number: int, edge: Transition) -> dict[str, str
 
 
 def default_line(
-    dot: str, state: str, at: Point, centre: Point, size: tuple[float, float], direction: str
+    dot: str, state: str, at: Point, centre: Point, size: tuple[float, float]
 ) -> DrawnLine:
-    """Return the arrow from the dot to the default state."""
+    """Return the arrow from the dot, above or to the left, to the default state."""
     (x, y), (to_x, to_y) = at, centre
-    if direction == "TB":
+    if y < to_y - size[1] / 2:
         start, end = (x, y + DOT_SIZE / 2), (x, to_y - size[1] / 2)
     else:
         start, end = (x + DOT_SIZE / 2, y), (to_x - size[0] / 2, y)

@@ -142,9 +142,7 @@ def _inside(sheet: ChartSheet, number: int, path: str, outline: _Outline) -> _Dr
             left = at[0] - inner[name].width / 2
             drawn.add(inner[name], (left, at[1] - size[1] / 2 + head.height + PAD / 2))
     ends = start, ids[names[0]]
-    drawn.lines.append(
-        default_line(*ends, laid.dot, laid.states[0], laid.sizes[0], sheet.direction)
-    )
+    drawn.lines.append(default_line(*ends, laid.dot, laid.states[0], laid.sizes[0]))
     for (_, edge), label, at, line in zip(edges, labels, laid.labels, laid.lines, strict=True):
         guard, name = (edge_id(element, kind, edge) for kind in ("guard", "edge"))
         marked = edge.name in sheet.marked

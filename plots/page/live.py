@@ -46,7 +46,7 @@ from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.system import System
 from gms_fsm.traces.trace import Trace
 from plots.page._sources import live_run
-from plots.page.replay import Replay, page_data, page_html, part_text
+from plots.page.replay import Replay, heading, page_data, page_html, part_text
 from plots.views.ranges import Ends, checked_ranges, is_logarithmic, usual_range
 
 LIVE = (
@@ -133,7 +133,7 @@ def play(
     engine = live_engine(start, trace.title)
     variants = [start, *(_variants(start) if len(engine.text) < LARGE else ())]
     traces = [trace, *(_beginning(each) for each in variants[1:])]
-    data, charts = page_data(traces, title=title)
+    data, charts = page_data(traces, title=title or heading(trace))
     engines = [engine, *(live_engine(each, trace.title) for each in variants[1:])]
     plane = {each["name"]: each["plane"] for each in data["runs"][0]["contacts"]}
     parts = zip(data["runs"], traces, variants, engines, strict=True)

@@ -26,7 +26,7 @@ from typing import Any, TypedDict, Unpack
 
 from gms_fsm.charts.chart import Chart
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import checked_kind, listed, refusing, unknown
+from gms_fsm.foundation.arguments import checked_kind, listed, pointing, refusing, unknown
 from gms_fsm.foundation.extras import missing
 from gms_fsm.foundation.quantities import PREFIXES, SMALLEST, TAKES_PREFIX, UNITS
 from gms_fsm.foundation.text import visible, visible_lines
@@ -96,6 +96,7 @@ def _elementary() -> str:
     return f"const ELEMENTARY = {library_text(ELEMENTARY)};\n"
 
 
+@pointing({"show": "page.save('page.html') and open it; a notebook shows the page itself"})
 @dataclass(frozen=True)
 class Replay:
     """A replay page; a notebook shows it in an isolated frame.
@@ -273,10 +274,10 @@ def page_data(
         pictures = [draw(view.model.chart, view.n) for view in views_of(each)]
         charts += [picture for picture in dict.fromkeys(pictures) if picture not in charts]
         run = stored_run(page, [charts.index(picture) for picture in pictures], reports)
-        head = [*names[i : i + 1], each.title]
+        head = [*(u for u in names[i : i + 1] if not each.title.startswith(u)), each.title]
         runs.append({"title": visible(": ".join(head)), "of": len(each), **run})
-    heading = title or " and ".join(dict.fromkeys(map(_heading, traces)))
-    own = {"title": visible(heading), "runs": runs, "notes": _notes(notes, traces)}
+    named = title or " and ".join(dict.fromkeys(map(heading, traces)))
+    own = {"title": visible(named), "runs": runs, "notes": _notes(notes, traces)}
     return {**own, **common_data()}, charts
 
 
@@ -354,7 +355,7 @@ def _notes(notes: Mapping[Any, str], traces: Sequence[Trace]) -> list[dict[str, 
     return found
 
 
-def _heading(trace: Trace) -> str:
+def heading(trace: Trace) -> str:
     """Return the title of the scenario, or else the name of what runs."""
     return trace.heading or trace.subject.title
 

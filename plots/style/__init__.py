@@ -215,7 +215,6 @@ SANS = f"{SANS_FONT},Verdana,Arial,sans-serif"
 MONO = f"{MONO_FONT},Menlo,Lucida Console,monospace"
 
 ELEMENT_STEPS = 7  # of a page and a schematic; dashes repeat only after the colours
-ELEMENT_COLOURS = ramp("elements", ELEMENT_STEPS)
 ELEMENT_DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
     "-",
     "--",

@@ -66,6 +66,7 @@ def test_the_formats_are_named_from_one_table(tmp_path: Path, gms_fsm: CommandLi
         ("run a.toml -s run.t_end=2", "No such option: -s. A key is changed by --set run.t_end=2"),
         ("run a.toml t_end=10", "changed by --set t_end=10"),
         ("run a.toml --law signed", "--set model.law=signed"),
+        ("debug servo --speed 2", "debug takes --light, --set, --tui"),
         ("chart gms signed", "chosen by --law signed"),
         ("code lugre -o lugre.py", "gms-fsm code ... > FILE"),
     ],

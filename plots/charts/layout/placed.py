@@ -76,9 +76,7 @@ def placed(
     """
     middle = [sum(each[k] for each in centres) / len(centres) for k in (0, 1)]
     laid = Laid(sizes=list(sizes), states=list(centres))
-    (x, y), (width, height) = centres[0], sizes[0]
-    down = direction == "TB"
-    laid.dot = (x, y - height / 2 - DEFAULT) if down else (x - width / 2 - DEFAULT, y)
+    laid.dot = _dot(list(zip(centres, sizes, strict=True)), direction)
     pairs: dict[tuple[int, int], list[int]] = {}
     for k, link in enumerate(links):
         pairs.setdefault((link.source, link.target), []).append(k)
@@ -98,6 +96,21 @@ def placed(
     drawn = [point for line in lines.values() for point in line.along()]
     drawn += [point for _, line in loops.values() for point in line]
     return _moved(laid, links, drawn)
+
+
+def _dot(boxes: Sequence[Box], direction: str) -> Point:
+    """Return the place of the dot: above the first state, or left of it, where no other state is."""
+    (x, y), (width, height) = boxes[0]
+    above, left = (
+        any(
+            abs(at[k] - (x, y)[k]) < (size[k] + boxes[0][1][k]) / 2 and at[1 - k] < (x, y)[1 - k]
+            for at, size in boxes[1:]
+        )
+        for k in (0, 1)
+    )
+    if not above and (direction == "TB" or left):
+        return x, y - height / 2 - DEFAULT
+    return x - width / 2 - DEFAULT, y
 
 
 def _bundle(

@@ -393,7 +393,7 @@ def _flow(ax: Axes, trace: Trace, plane: Plane, view: PlaneWindow, names: LineNa
 
 
 class _FlowArrows(Quiver):
-    """Arrows at their tails, without those that a name would cover."""
+    """Arrows at their tails, without those that a name or a mark would cover."""
 
     def __init__(self, ax: Axes, names: LineNames, tails: Floats, arrows: Floats) -> None:
         look: Any = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "color": PALE_GREY}

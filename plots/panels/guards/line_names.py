@@ -70,7 +70,7 @@ class LineNames(Artist):
     lines : list of NamedLine
         What to name.
     avoid : list of (float, float)
-        Points that no name covers, in data coordinates.
+        Points of marks, which no name covers, in data coordinates.
     curves : list of ndarray, shape (points, 2)
         Further lines that names cover only if there is no other place.
     """
@@ -93,11 +93,7 @@ class LineNames(Artist):
     def placed(self, renderer: RendererBase) -> list[Text]:
         """Return the names that have a place, in pixels of a renderer."""
         ax, unit = self._owner, float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
-        taken = _Taken()
-        for point in self.avoid:
-            x, y = ax.transData.transform(point)
-            size = CLEAR * unit
-            taken.boxes.append(Bbox.from_extents(x - size, y - size, x + size, y + size))
+        taken = _Taken(self._avoided(unit))
         dense = [[_dense(ax, piece, unit) for piece in line.pieces] for line in self.lines]
         others = [_dense(ax, curve, unit) for curve in self.curves]
         found: list[Text] = []
@@ -118,13 +114,18 @@ class LineNames(Artist):
         assert isinstance(self.axes, Axes)
         return self.axes
 
+    def _avoided(self, unit: float) -> list[Bbox]:
+        """Return boxes around the points that no name covers."""
+        points = [self._owner.transData.transform(point) for point in self.avoid]
+        return [Bbox([point - CLEAR * unit, point + CLEAR * unit]) for point in points]
+
     def covered(self, renderer: RendererBase, tails: Floats, heads: Floats) -> NDArray[np.bool_]:
-        """Return which arrows a name would cover, by their ends in data coordinates."""
-        pad = PAD * float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
+        """Return which arrows a name or a mark would cover, by their ends in data coordinates."""
+        unit = float(renderer.points_to_pixels(1.0))  # type: ignore[arg-type]
         ends = [self._owner.transData.transform(each.reshape(-1, 2)) for each in (tails, heads)]
         found = np.zeros(len(ends[0]), dtype=bool)
-        for text in self.placed(renderer):
-            box = text.get_window_extent(renderer).padded(pad)
+        names = [text.get_window_extent(renderer) for text in self.placed(renderer)]
+        for box in [*self._avoided(unit), *(name.padded(PAD * unit) for name in names)]:
             for part in np.linspace(0.0, 1.0, 5):
                 point = ends[0] + part * (ends[1] - ends[0])
                 found |= ((point > box.min) & (point < box.max)).all(axis=1)

@@ -90,6 +90,7 @@ SEVEN_PARAMETER = Chart(
         "curve": "f / (1 + (v_l / v_s)**2)",
         "risen": "f + (F_s - F_c - f) * age / (age + gamma)",
     },
+    layout={"forward": (0, 0), "stick": (0, 170), "backward": (0, 340)},
 )
 CHARTS = (
     Entry(

@@ -45,6 +45,7 @@ STICTION = Chart(
         Transition("reverse_backward", "backward", "forward", guard="v > 0"),
     ),
     reference="Olsson et al. (1998)",
+    layout={"stuck": (190, 0), "backward": (0, 180), "forward": (380, 180)},
 )
 CHARTS = (
     Entry(

@@ -307,6 +307,17 @@ function heldBack(contact, leaving, scope) {
   return `${contact.edges[k].name} does not fire: ${why}`;
 }
 
+// The lines of a guard take the room of marks that are not shown.
+function closeUp(texts, marked) {
+  const placeOf = (text) => Number(text.dataset.x ??= text.getAttribute("x"));
+  for (let k = 0, shift = 0; k < texts.length; k++) {
+    const [text, next] = [texts[k], texts[k + 1]];
+    text.setAttribute("x", placeOf(text) - shift);
+    if (next?.getAttribute("y") !== text.getAttribute("y")) shift = 0;
+    else if (!marked && text.matches(".mark")) shift += placeOf(next) - placeOf(text);
+  }
+}
+
 // ------------------------------------------------------------------ the chart: its SVG is laid out once and restyled
 class ChartPane {
   static side = "left"; static key = "chart"; static title = "Chart";
@@ -374,6 +385,10 @@ class ChartPane {
         on("pale", !leaving);
         on("fired", k === fired);
         if (!node.matches(".guard")) continue;
+        if (node.dataset.marked !== String(leaving)) {
+          node.dataset.marked = leaving;
+          closeUp($$("text", node), leaving);
+        }
         on("break", stops[k]);
         node.setAttribute("aria-pressed", stops[k]);
         node.setAttribute("aria-label", `Breakpoint: ${nameOf(contact, element)}, ${contact.edges[k].name}`);
