@@ -41,7 +41,7 @@ from gms_fsm.charts import GMS_ELEMENT, LUGRE
 from gms_fsm.charts.broken import BROKEN
 from gms_fsm.foundation.files import write_whole
 from plots import figures, panels
-from plots.style import INK, LINE_GREY, RC, TEXT_GREY, compared_look, ramp
+from plots.style import INK, LINE_GREY, RC, TEXT_GREY, ramp
 from plots.style.presets import Preset
 from plots.systems.mechanism import schematic_figure
 
@@ -345,18 +345,18 @@ def compensation_figure() -> Figure:
     names = names_of("compensation.md")
     x, t = names["motions"]["inner loops"], names["t"]
     with rc_context(RC):
-        figure = Figure(figsize=(7.2, 4.2), layout="constrained")
-        top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
+        figure = Figure(figsize=(7.2, 5.4), layout="constrained")
+        top, *axes = figure.subplots(5, 1, sharex=True, height_ratios=(1.2, 1, 1, 1, 1))
         top.plot(t, 1e3 * x, color=INK)
-        top.set_ylabel("reference [mm]")
-        looks = {"none": 3, "Coulomb": 1, "LuGre": 4, "GMS": 0}
-        for name, look in looks.items():
-            model = names["models"][name]
+        top.set_ylabel("reference\n[mm]")
+        for ax, (name, model) in zip(axes, names["models"].items(), strict=True):
             compensator = None if model is None else names["Compensator"](model, names["tick"])
             error = (names["follow"](x, compensator) - x[1:-1]) / names["count"]
-            bottom.plot(t[1:-1], error, **compared_look(look), label=name)
-        bottom.set(xlabel="$t$ [s]", ylabel="error [counts]", ylim=(-21, 27))
-        bottom.legend(ncols=4, loc="upper right")
+            ax.axhline(0.0, color=LINE_GREY, linewidth=0.6)
+            ax.plot(t[1:-1], error, color=INK)
+            ax.set(ylabel=f"{name}\n[counts]", ylim=(-21, 21), yticks=(-20, 0, 20))
+        axes[-1].set(xlabel="$t$ [s]", xlim=(t[0], t[-1]))
+        figure.align_ylabels()
     return figure
 
 

@@ -268,11 +268,12 @@ def test_its_policy_has_hashes_only(live: Any) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_axe_finds_nothing(live: Any, size: str) -> None:
-    page = live("pulled_mass", size=size)
+def test_axe_finds_nothing_and_nothing_is_beside_the_page(live: Any, size: str) -> None:
+    page = live("servo", size=size)
     page.evaluate("document.querySelector('#numbers details').open = true")
-    turned(page, {"F_s": 1.8})
+    turned(page, {"numbers.k_p": 300.0})
     assert faults(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     page.emulate_media(color_scheme="dark")
     assert faults(page) == []
 

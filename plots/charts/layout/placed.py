@@ -99,7 +99,7 @@ def placed(
 
 
 def _dot(boxes: Sequence[Box], direction: str) -> Point:
-    """Return the place of the dot: above the first state, or left of it, where no other state is."""
+    """Return the place of the dot: above the first state or left of it, where no other is."""
     (x, y), (width, height) = boxes[0]
     above, left = (
         any(

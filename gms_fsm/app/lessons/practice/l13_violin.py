@@ -18,7 +18,7 @@ and presses so that friction is 0.24 N at rest and falls to 0.08 N in sliding.
 
 1. At which frequency does it sound, in Hz?
 2. How far does it swing to either side, in um? While it sticks it is as fast as the bow.
-3. The player presses the bow 50 % harder. Is the note "higher", "lower", or the "same"?
+3. The player presses the bow 50 % harder. Is the note "higher", "lower", or exactly the "same"?
 
 ## Measure
 
