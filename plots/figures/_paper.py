@@ -85,6 +85,7 @@ def figure_3(
             panels.hysteresis(ax, trace, phases, scale=scale)
             ax.sharex(axes[1])
             ax.sharey(axes[1])
+            ax.margins(x=0.08)  # the last mark is not at the end
             peak = int(trace.F.argmax())
             x_peak = scale[0] * (trace.x[peak] - trace.x[0])
             if limit is not None and trace.F[peak] > limit:
@@ -116,10 +117,9 @@ def figure_4(chart: Trace, ifelse: Trace, lugre: Trace) -> Figure:
         figure = sheet(4.2, 10.0) if narrow() else sheet(10.5, 6.2)
         axes = figure.subplots(*(6, 1) if narrow() else (2, 3), sharex=True).ravel()
         panels.velocity(axes[0], chart)
-        scale = _common_scale(chart, lugre)
-        panels.deflections(axes[1], chart, scale=scale)
+        panels.deflections(axes[1], chart)
         element_legend(figure, axes[1])
-        panels.deflections(axes[2], lugre, scale=scale)
+        panels.deflections(axes[2], lugre)
         for ax, trace in zip(axes[3:], (chart, ifelse, lugre), strict=True):
             panels.force(ax, trace)
             _make_room(ax)
