@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -148,6 +149,21 @@ def test_chart_table_and_crosshair_follow_every_firing(open_page: Open) -> None:
     assert page.locator(".plots output").first.inner_text() == page.evaluate(
         f"eng(runs[0].contacts[0].value('F', 0, {row}), 'N', 5)"
     )
+
+
+def test_guards_without_marks_keep_no_room_for_them(open_page: Open) -> None:
+    page = open_page("published")
+    pieces = """[...document.querySelectorAll(".guard")].map((guard) => [
+        guard.matches(".pale"), [...guard.querySelectorAll("text:not(.priority)")].map((text) =>
+            [text.textContent, Number(text.getAttribute("x")), text.getAttribute("y")])])"""
+    for _ in range(3):
+        press(page, "Shift+ArrowRight")
+        guards = page.evaluate(pieces)
+        assert {pale for pale, _ in guards} == {True, False}
+        for pale, texts in guards:
+            assert pale != any("✓" in text or "✗" in text for text, *_ in texts)
+            for (text, x, y), (_, following, line) in pairwise(texts):
+                assert y != line or following - x == pytest.approx(6 * len(text), abs=0.5)
 
 
 @pytest.mark.parametrize(("size", "scheme"), [("laptop", "light"), ("phone", "dark")])

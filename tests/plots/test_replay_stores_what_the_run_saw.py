@@ -258,3 +258,14 @@ def test_powers_are_stored_and_charts_without_a_plane_and_runs_of_one_instant_ha
         simulate(stick_slip("signed"), Prescribed("0.1*sqrt(-t)"), 5.0)
     assert run_of(stopped.value.trace)["rows"] == 1
     assert tree_of(InState(0, "slip")) == ["state", 0, "slip"]
+
+
+def test_a_name_that_a_title_begins_with_is_not_said_twice() -> None:
+    trace = fig4("signed")
+    for name in ("other", trace.title[:8]):
+        assert run_of(trace, names=[name])["title"].count(name) == 1
+
+
+def test_a_page_says_how_it_is_shown() -> None:
+    with pytest.raises(AttributeError, match=r"a Replay has no 'show'; write page\.save\("):
+        replay(fig4("signed")).show()  # type: ignore[attr-defined]
