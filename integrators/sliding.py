@@ -43,6 +43,7 @@ __all__ = [
     "other_mode",
     "sliding_scratch",
     "slope_on",
+    "solve",
     "to_neither",
 ]
 
@@ -231,7 +232,7 @@ def slope_on(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None
                 gain += g[j] * half[j]
             row[c] = gain
         sliding.rates[r], sliding.gains[r] = rate, row[r]
-    _solve(sliding.matrix, count, sigma)
+    solve(sliding.matrix, count, sigma, BEYOND)
     for c in range(count):
         if surfaces.machine[which[c]] < 0:
             held[surfaces.sign[which[c]]] = sigma[c]
@@ -280,8 +281,8 @@ def go_back(surfaces: Surfaces, k: int, kept: int, signs: Vector, mode: list[int
         mode[i] = kept
 
 
-def _solve(matrix: list[Vector], count: int, out: Vector) -> None:
-    """Solve a small linear system, right side in the last column; clip large values."""
+def solve(matrix: list[Vector], count: int, out: Vector, most: float) -> None:
+    """Solve a small linear system, right side in the last column; values end at a largest one."""
     for c in range(count):
         best = c
         for r in range(c + 1, count):
@@ -305,9 +306,9 @@ def _solve(matrix: list[Vector], count: int, out: Vector) -> None:
         for c in range(r + 1, count):
             rest -= row[c] * out[c]
         if row[r] != 0.0:
-            out[r] = min(max(rest / row[r], -BEYOND), BEYOND)
+            out[r] = min(max(rest / row[r], -most), most)
         else:  # the sign has no effect on it
-            out[r] = 0.0 if rest == 0.0 else BEYOND
+            out[r] = 0.0 if rest == 0.0 else most
 
 
 def flow_on(t: float, y: Vector, mode: list[int], held: Vector, on: Held, dy: Vector) -> None:

@@ -1,43 +1,39 @@
-"""The variational equations along a run, and what a switch does to them.
+"""The tangents of a run: the loop of `integrators.tangents` on the functions of a program.
 
-The loop of the engines is run once more, and between two of its rows the state and its tangents are
-integrated together. They take no part in the choice of its steps, so that the run has its bits; an
-error estimate of their own divides a step where the tangents need it.
-
-At a switch the time itself has a derivative: that of the zero of the margin that has just changed.
-There tangents are followed at the moving instant (``y_t + dy/dt t_t``), taken through every edge
-and every tick as they happened, and then brought back to a fixed time with the flow behind it
-(saltation).
+It is machine code wherever that is installed, whatever engine the run itself has: the bits are the
+same without it.
 """
 
 from __future__ import annotations
 
+import copy
 import dataclasses
-from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import functools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.gradients.arcs import Arcs
-from gms_fsm.gradients.linear import Directions, Linear
+from gms_fsm.foundation.equality import ByIdentity
+from gms_fsm.foundation.extras import has_machine_code
+from gms_fsm.gradients.linear import Directions
+from gms_fsm.gradients.tangents import in_lanes
 from gms_fsm.language import comparisons, split
+from gms_fsm.lowering import compiling
 from gms_fsm.lowering.program import Program, equations
-from integrators import Arc, Firing, Held, LoopOptions, Slide, Stop, hybrid
-from integrators.advance import CROSSED, REACHED, raise_floor, tick_at
-from integrators.crossings import any_changed, listed
-from integrators.sliding import margins_on
-from integrators.steps import time_of
+from integrators import METHODS, Functions, Held, LoopOptions, Tableau, hybrid, sliding_scratch
+from integrators.loop import ADVANCE, DONE, ROWS, Machines
+from integrators.steps import Dense, Now, Scratch, coefficients
+from integrators.tangents import switches
+from integrators.tangents.motion import Course, LaneFunctions, Lanes, SlideLanes, Traced
+from integrators.tangents.run import FollowArguments, follow_run
 
-Modes = tuple[int, ...]
-ALIKE = 1e-7  # times of switches that differ by less have one derivative
-ROUNDING = 1e-12  # of the length of a run
-SHORT = 64.0  # ticks: an arc that a switch has ended at once
-NOTHING = 1e-9  # of the natural size of a margin's derivative
-BACK = 1e-8  # of the last step: just before a switch
-GRAZING = 1e-4  # of the mean rate of a margin over its last step
+METHOD = coefficients(METHODS["dp45"])
+LANES = 4  # directions side by side, where there are several
+ROWS_AT_ONCE = 256
+STEPS_AT_ONCE = 20_000
 
 
 @dataclass(frozen=True)
@@ -86,70 +82,13 @@ class Followed:
     end: FloatArray
     doubts: tuple[DerivativeDoubt, ...]
 
-
-@dataclass(eq=False)
-class _Operation:
-    """Something that changes the state at an instant: an edge, or a tick."""
-
-    name: str
-    numbers: tuple[int, ...]
-    t: float
-    y: list[float]  # before it
-    mode: list[int]
-
-
-@dataclass(eq=False)
-class _Recording:
-    """The machines of the if-else text, which note what they do."""
-
-    functions: Any
-    done: list[_Operation] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.ask, self.jolts = self.functions["switch"], self.functions["jolts"]
-
-    def act(
-        self, edge: int, machine: int, t: float, y: list[float], mode: list[int], p: Any
-    ) -> None:
-        self.done.append(_Operation("act", (edge, machine), t, list(y), list(mode)))
-        self.functions["act"](edge, machine, t, y, mode, p)
-
-    def tick(self, bits: int, t: float, y: list[float], mode: list[int], p: Any) -> None:
-        self.done.append(_Operation("tick", (bits,), t, list(y), list(mode)))
-        self.functions["tick"](bits, t, y, mode, p)
-
-
-@dataclass(eq=False)
-class _Crossing:
-    """Where an arc ended because comparisons changed."""
-
-    relations: list[int]
-    t: float
-    y: list[float]
-    mode: Modes
-    held: list[float]
-
-
-@dataclass(frozen=True, eq=False)
-class RunAsRecorded:
-    """A run as it was recorded.
-
-    Parameters
-    ----------
-    times, states : list of float, and ndarray
-        Its rows.
-    stop_times, stop_states : list of float, and ndarray
-        Both sides of all its stops.
-    """
-
-    times: list[float]
-    states: FloatArray
-    stop_times: list[float]
-    stop_states: FloatArray
-
-
-class Follower:
-    """Follows one run.
+def follow(
+    program: Program,
+    options: LoopOptions,
+    start: tuple[float, list[float], list[int], float],
+    directions: Directions,
+) -> Followed:
+    """Differentiate a run.
 
     Parameters
     ----------
@@ -161,9 +100,14 @@ class Follower:
         Time, state and modes at the start, and the last time.
     directions : Directions
         Those of the tangents.
-    recorded : RunAsRecorded, optional
-        What machine code has recorded of the run: the loop then goes from stop to stop.
     """
+    inside = has_machine_code() and isinstance(options.method, Tableau)
+    run = _TangentRun(program, options, start, directions, inside)
+    return run.to_its_end(run.in_block() if inside else run.in_lists())
+
+
+class _TangentRun:
+    """A run with tangents, as arrays or as lists."""
 
     def __init__(
         self,
@@ -171,345 +115,281 @@ class Follower:
         options: LoopOptions,
         start: tuple[float, list[float], list[int], float],
         directions: Directions,
-        recorded: RunAsRecorded | None = None,
+        compiled: bool,
     ) -> None:
-        self.program, self.directions = program, directions
-        self.linear = Linear(program, directions)
-        t, y, mode, self.last = start
-        self.wanted = None if options.times is None else [float(u) for u in options.times]
+        self.program, self.directions, self.compiled = program, directions, compiled
+        self.start, self.wanted = start, options.times
         self.options = dataclasses.replace(options, times=None)
-        self.start = t, y, mode
-        made = equations(program)
-        self.switch = _Recording(program.ieee)
-        b = hybrid.buffers(made, t, y, mode, self.last, self.options)
-        self.recorded = recorded
-        if recorded is not None:
-            b = b._replace(plan=b.plan._replace(foreign=True))
-        self.buffers = b
-        solver = None if recorded is None else self
-        self.on = Held(made.functions(True), b.now.held, b.sliding)
-        self.events = hybrid.events(made, self.switch, b, self.options, solver)
-        self.t, self.y = t, list(y)
-        self.mode: Modes = program.layout.not_sliding(mode)
-        self.S = directions.y.copy()
-        self.size = np.abs(np.array(y))
-        self.row_times: list[float] = []
-        self.rows: list[FloatArray] = []
-        self.times: list[FloatArray] = []
-        self.doubts: list[DerivativeDoubt] = []
-        self.at_instant = True
-        self.settled = -np.inf, np.zeros(directions.count)  # the last instant, and how it moves
-        self.crossing: _Crossing | None = None
-        self.waiting: list[tuple[int, list[float], Modes]] = []  # rows of this instant
-        self.taken = 0  # of the requested times
-        self.arc: tuple[Modes, list[float]] | None = None
-        self.arcs = Arcs(self.linear, self.options)
-        self.guarded: dict[tuple[int, ...], list[int]] = {}
-        self.before: tuple[float, list[float]] = t, list(y)
+        self.lanes = LANES if directions.count >= LANES else 1
+        self.wide = (directions.count // self.lanes + 1) * self.lanes  # the time has a place, too
+        size, title = len(start[1]), program.plan.title
+        self.tangents = in_lanes(program.source, title, directions.places, self.lanes, size)
+        self.texts: Any = compiling.functions(program) if compiled else program.ieee
 
-    # ------------------------------------------------------------------ the run
-    def follow(self) -> Followed:
-        """Follow the run to its end."""
-        for event in self.events:
-            match event:
-                case Arc(t=times, y=states, mode=mode):
-                    self.rows_of(times, states, mode)
-                case Firing() | Slide():
-                    self.hold(event.y, event.mode)
-                case Stop():
-                    self.stop(event)
-        self.settle(None)
-        wanted = self.wanted
-        while wanted is not None and self.taken < len(wanted):
-            self.keep(wanted[self.taken], self.S)
-            self.taken += 1
-        count = self.directions.count
-        shape = (-1, len(self.y), count)
+    # ------------------------------------------------------------------ arguments
+    def arguments(self, outside: Callable[[Any], Any]) -> FollowArguments:
+        """Return the arguments, with something in place of arrays of any length."""
+        program, (t, y, mode, last), made = self.program, self.start, self.texts
+        tangents = self.tangents["plain"] if self.compiled else self.tangents
+        first = "flow" if self.options.located else "flow_live"
+        shared, own, tables = compiling.packed(program.p)
+        p = (shared.tolist(), own.tolist(), outside(tables)) if self.compiled else program.p
+        names = first, "arm", "margins", "normal", "follow"
+        numbers = Functions(*(made[name] for name in names), p)
+        machines = [made[name] for name in ("switch", "act", "tick", "jolts", "observe")]
+        b = hybrid.buffers(equations(program), t, y, mode, last, self.options, ROWS_AT_ONCE)
+        relations, plan = len(b.relations.watch), b.plan
+        columns = {name: outside(np.array(getattr(plan, name), float)) for name in _FLOATS}
+        b = b._replace(plan=plan._replace(**columns, ticks=outside(np.array(plan.ticks, int))))
+        b.out.times, b.out.rows_t, b.out.rows_y = (
+            outside(np.array(each, float)) for each in ([], b.out.rows_t, b.out.rows_y)
+        )
+        traced = Traced(
+            numbers,
+            Machines(*machines),
+            LaneFunctions(*(tangents[name] for name in LaneFunctions._fields)),
+            METHOD,
+            [self.options.rtol],
+            [int(self.wanted is None)],
+            [program.velocities],
+            [self.directions.count],
+            self.course(relations, outside),
+            self.scratch(relations),
+        )
+        noting = switches.ask, switches.act, switches.tick, switches.jolts, machines[-1]
+        return FollowArguments(switches.functions_of(traced), Machines(*noting), b)
+
+    def course(self, relations: int, outside: Callable[[Any], Any]) -> Course:
+        """Return the tangents at the start."""
+        program, (t, y, _, last), count = self.program, self.start, self.directions.count
+        size, wide, n = len(y), self.wide, program.layout.n
+        S, scales = np.zeros((size, wide)), np.ones(wide)
+        S[:, :count], scales[:count] = self.directions.y, self.directions.scales
+        guards, first_guards = _guards(ByIdentity(program.plan), ByIdentity(program.layout))
+        room = 4 * ROWS_AT_ONCE if self.wanted is None else len(self.wanted)
+
+        def floats(*shape: int) -> Any:
+            return outside(np.zeros(shape))
+
+        def places(length: int) -> Any:
+            return outside(np.zeros(length, dtype=np.int64))
+
+        return Course(
+            t=t, before=t, settled=-np.inf, span=last - t, instant=1, changed=0, moving=0,
+            rows=0, fired=0, next_time=0, doubts=0, named=0,
+            y=list(y), y_before=list(y), mode=[0] * n, held=[0.0] * program.held,
+            f=[0.0] * size, sizes=[abs(u) for u in y],
+            watch=[0] * relations, only=[0] * relations, armed=[0] * relations,
+            margins=[0.0] * relations, rates=[0.0] * relations,
+            guards=guards, first_guards=first_guards, sliding=self.sliding(relations),
+            S=outside(S), t_t=floats(wide), t_before=floats(wide),
+            slopes=floats(relations, wide), moves=outside(self.moves()), scales=outside(scales),
+            times=outside(np.array(() if self.wanted is None else self.wanted, float)),
+            rows_t=floats(room), table=floats(room, size * wide), firings=floats(64, wide),
+            doubt_t=floats(16), doubt_kind=places(16), doubt_end=places(16),
+            doubt_names=places(16 * (relations + 1)),
+        )  # fmt: skip
+
+    def sliding(self, relations: int) -> Any:
+        """Return scratch space for sliding."""
+        program, size = self.program, len(self.start[1])
+        return sliding_scratch(program.surfaces, size, program.held, relations, 0)
+
+    def scratch(self, relations: int) -> Lanes:
+        """Return the lanes of a group."""
+        program, lanes, (shared, own, _) = self.program, self.lanes, self.program.p
+        size, longest = len(self.start[1]), max(map(len, own), default=0)
+        both, most = size * (1 + lanes), len(self.sliding(relations).sigma)
+        alone, wide = (size, both) if most else (0, 0)
+
+        def vector(length: int = both) -> list[float]:
+            return [0.0] * length
+
+        def rows(number: int, length: int) -> list[list[float]]:
+            return [vector(length) for _ in range(number)]
+
+        now = Now(
+            **dict.fromkeys(("t", "h", "error_before", "anchor", "switched"), 0.0),
+            **dict.fromkeys(("t_stop", "pause", "latest", "seen"), np.inf),
+            y=vector(), f=vector(), mode=[0] * program.layout.n, held=vector(program.held),
+            floor=[],
+        )  # fmt: skip
+        dense = Dense(*(vector() for _ in Dense._fields))
+        return Lanes(
+            now,
+            Scratch(rows(len(METHOD.B), both), vector(), vector(), vector(), dense),
+            [0] * program.layout.n,
+            vector(lanes),
+            vector(lanes),
+            vector(len(shared) * lanes),
+            rows(len(own), longest * lanes),
+            vector(relations),
+            vector(relations * lanes),
+            SlideLanes(
+                vector(alone), vector(alone), vector(wide), vector(wide),
+                rows(max(most, 1), wide), vector(alone + 1), vector((alone + 1) * lanes),
+                vector(most * lanes), vector(most * lanes), vector(most),
+            ),
+        )  # fmt: skip
+
+    def moves(self) -> FloatArray:
+        """Return what all numbers change by, lanes of each group."""
+        d, (shared, own, _) = self.directions, self.program.p
+        longest = max(map(len, own), default=0)
+        rows = np.zeros((len(shared) + len(own) * longest, self.wide))
+        for k, change in d.shared.items():
+            rows[k, : d.count] = change
+        for k, changes in d.own.items():
+            first = len(shared) + k * longest
+            rows[first : first + len(changes), : d.count] = changes
+        groups = rows.reshape(len(rows), -1, self.lanes).transpose(1, 0, 2)
+        return np.ascontiguousarray(groups.reshape(groups.shape[0], -1))
+
+    # ------------------------------------------------------------------ how it is run
+    def in_lists(self) -> _Call:
+        """Return what goes on in Python."""
+        arguments, solver = self.arguments(lambda array: array.tolist()), None
+        b = arguments.buffers
+        if b.plan.foreign:
+            from integrators.runners.scipy_arcs import SciPyStepper
+
+            solver = SciPyStepper(Held(arguments.functions, b.now.held, b.sliding), b, self.options)
+
+        def call() -> int:
+            event = follow_run(*arguments, STEPS_AT_ONCE)
+            if event == ADVANCE and solver is not None:
+                solver.advance(ROWS_AT_ONCE)
+                event = ROWS
+            return event
+
+        course = arguments.functions.p.course
+        return _Call(call, course, course)
+
+    def in_block(self) -> _Call:
+        """Return what goes on in machine code."""
+        from integrators.machine_code.layout import MemoryBlock
+
+        function, arguments = self.compiled_function(), self.arguments(lambda array: array)
+        block = MemoryBlock(function.layout, arguments)
+
+        def call() -> int:
+            block.update(arguments)
+            return function(block, STEPS_AT_ONCE)
+
+        return _Call(call, block.contents.functions.p.course, arguments.functions.p.course)
+
+    def compiled_function(self) -> Any:
+        """Return machine code for all runs that differ in numbers only."""
+        from integrators.machine_code.layout import OuterArray
+        from integrators.runners import compiled
+
+        program, lengths = self.program, tuple(map(len, self.program.p[1]))
+        text = self.tangents["text"]
+        key = program.source, text, lengths, self.options.method, self.options.located
+        if key not in _KEPT:
+            if len(_KEPT) >= compiling.MOST_ENGINES:
+                _KEPT.clear()
+
+            def column(array: Any) -> Any:
+                return OuterArray(array.dtype.kind, table=array.ndim == 2)
+
+            example = self.arguments(column)
+            text = compiling.text_of(program, text)
+            _KEPT[key] = compiled.follower(text, example, compiling.store(), compiling.notify)
+        return _KEPT[key]
+
+    def to_its_end(self, call: _Call) -> Followed:
+        """Go on to the end, and return what has been kept."""
+        c = call.course
+        while (event := call.on()) != DONE:
+            if event != ROWS:
+                raise RuntimeError(f"a run has ended otherwise than before: {event}")
+            call.make_room()
+        count, arrays = self.directions.count, call.arrays
+        table = np.array(arrays.table[: c.rows], float).reshape(c.rows, -1, self.wide)
+        firings = np.array(arrays.firings[: c.fired], float).reshape(c.fired, self.wide)
         return Followed(
-            np.array(self.row_times),
-            np.array(self.rows).reshape(shape),
-            np.array(self.times).reshape(-1, count),
-            self.S,
-            tuple(self.doubts),
+            np.array(arrays.rows_t[: c.rows], float),
+            table[:, :, :count].reshape(c.rows, len(self.start[1]), count),
+            firings[:, :count],
+            np.array(arrays.S, float)[:, :count],
+            tuple(self.doubts(c, arrays)),
         )
 
-    def hold(self, y: list[float], mode: Modes) -> None:
-        """Note a row of an instant."""
-        self.y, self.mode = list(y), mode
-        self.at_instant = True
-        self.waiting.append((len(self.switch.done), list(y), mode))
-
-    def rows_of(self, times: list[float], states: list[list[float]], mode: Modes) -> None:
-        """Go on along rows of one arc; those at its very start belong to the instant before."""
-        passed = 0
-        while passed < len(times) and times[passed] <= self.t:
-            self.hold(states[passed], mode)
-            passed += 1
-        if passed == len(times):
-            return
-        self.begin(mode)
-        self.integrate(times[passed:], states[passed:])
-
-    def begin(self, mode: Modes) -> None:
-        """Begin an arc, if one does."""
-        if self.at_instant:
-            self.mode = mode
-            held = list(self.buffers.now.held)
-            self.settle(held)
-            self.arc = mode, held
-
-    def advance(self, _: int) -> None:
-        """Go to the end of an arc as it was recorded, in place of a solver."""
-        b, recorded = self.buffers, self.recorded
-        assert recorded is not None
-        now = b.now
-        end = bisect_right(recorded.stop_times, self.t)
-        t, y = recorded.stop_times[end], recorded.stop_states[end].tolist()
-        rows = slice(bisect_right(recorded.times, self.t), bisect_left(recorded.times, t))
-        self.begin(hybrid.modes_of(b))
-        times, states = recorded.times[rows], recorded.states[rows].tolist()
-        self.integrate([*times, t], [*states, y])
-        now.t = t
-        now.y[:] = y
-        w = listed(b.relations, b.memory.active)
-        margins_on(time_of(now), now.y, now.mode, self.on, w.watch, w.search.probe)
-        b.memory.status = CROSSED if any_changed(w, w.search.probe) else REACHED
-        raise_floor(b.plan.control, now)
-
-    def keep(self, t: float, S: FloatArray) -> None:
-        """Keep a row."""
-        self.row_times.append(t)
-        self.rows.append(S.copy())
-
-    def stop(self, event: Stop) -> None:
-        """Note the end of an arc, or either side of a jump."""
-        b = self.buffers
-        if not self.at_instant and self.arc is not None:
-            self.switch.done.clear()
-            if b.memory.status == CROSSED and event.t >= b.now.t:
-                active = b.relations.room[: b.memory.active]
-                changed = [r for r in active if b.relations.changed[r]]
-                if changed:
-                    mode, held = self.arc
-                    self.crossing = _Crossing(changed, self.t, list(self.y), mode, held)
-        self.at_instant = True
-        self.y, self.mode = list(event.y), event.mode
-        self.t = max(self.t, event.t)  # a jump is one clock tick later
-
-    # ------------------------------------------------------------------ arcs
-    def integrate(self, times: list[float], states: list[list[float]]) -> None:
-        """Integrate the tangents along rows of an arc, and keep what is wanted."""
-        assert self.arc is not None
-        wanted, end = self.wanted, times[-1]
-        kept = times if wanted is None else []
-        if wanted is not None:
-            while self.taken < len(wanted) and wanted[self.taken] < end:
-                kept.append(wanted[self.taken])
-                self.taken += 1
-        knots = self.program.knots
-        between = knots[bisect_right(knots, self.t) : bisect_left(knots, end)]
-        nodes: dict[float, list[float] | None] = dict.fromkeys([*kept, *between])
-        nodes |= {self.t: self.y, **dict(zip(times, states, strict=True))}
-        t = sorted(nodes)
-        self.size = np.maximum(self.size, np.abs(np.array([self.y, *states])).max(axis=0))
-        table = self.arcs.integrate(*self.arc, t, [nodes[u] for u in t], self.S, self.size)
-        places = {u: place for place, u in enumerate(t)}
-        known: Any = np.isfinite(table).all(axis=(1, 2))
-        if known[0] and not known[-1]:
-            first = t[int(np.argmin(known))]
-            reason = "nothing has a derivative from then on"
-            self.doubts.append(
-                DerivativeDoubt("none", first, "the slope of a rate is not finite", reason)
+    def doubts(self, c: Any, arrays: Any) -> Iterator[DerivativeDoubt]:
+        """Yield what is doubtful, in words."""
+        first, names = 0, self.program.relations
+        for k in range(c.doubts):
+            t, kind, end = arrays.doubt_t[k], arrays.doubt_kind[k], arrays.doubt_end[k]
+            which = [int(r) for r in arrays.doubt_names[first:end]]
+            first = end
+            said = dict.fromkeys(names[r] if r < len(names) else SLIDE_ENDS for r in which)
+            word, place, reason = DOUBTS[int(kind)]
+            yield DerivativeDoubt(
+                word, float(t), place or f"{' and '.join(said)} changes", reason
             )
-        for u in kept:
-            self.keep(u, table[places[u]])
-        self.before = ([self.t, *times][-2], [self.y, *states][-2])
-        self.t, self.y, self.S = end, list(states[-1]), table[-1].copy()
 
-    # ------------------------------------------------------------------ switches
-    def settle(self, held: list[float] | None) -> None:
-        """Take the tangents through everything that happened at this instant."""
-        done, waiting = self.switch.done, self.waiting
-        total, t_t = self.S, np.zeros(self.directions.count)
-        c = self.crossing
-        if c is not None:
-            total, t_t = self.arrive(c)
-        changed = [] if c is None else c.relations
-        after: list[tuple[FloatArray, FloatArray]] = [(total, t_t)]
-        for each in done:
-            if each.name == "act":
-                if changed:
-                    total, t_t = self.awaited(each, changed, total, t_t)
-                self.times.append(t_t)
-            total = self.through(each, total, t_t)
-            after.append((total, t_t))
-        for number, y, mode in waiting:
-            total, t_t = after[number]
-            if self.wanted is None:
-                signs = self.linear.armed(self.t, y, mode)
-                self.keep(self.t, self.fixed(y, mode, signs, total, t_t))
-        total, t_t = after[-1]
-        signs = self.linear.armed(self.t, self.y, self.mode) if held is None else held
-        self.S = self.fixed(self.y, self.mode, signs, total, t_t)
-        self.S = self.linear.onto(self.t, self.y, self.mode, signs, self.S)
-        if self.program.velocities:  # what locks hold is not free
-            states = (self.t, list(self.y), list(self.mode), list(signs), self.program.p)
-            self.S = self.linear.call("follow", states, np.zeros(self.S.shape[1]), self.S)[1]
-        self.switch.done.clear()
-        self.waiting.clear()
-        self.crossing, self.at_instant = None, False
-        self.settled = self.t, t_t
 
-    def fixed(
-        self, y: list[float], mode: Modes, held: list[float], total: FloatArray, t_t: FloatArray
-    ) -> FloatArray:
-        """Bring tangents back from the moving instant to a fixed time."""
-        if not t_t.any():
-            return total
-        f = self.rate(y, mode, held)
-        return total - f[:, None] * t_t
+SLIDE_ENDS = "the end of a slide"
+DOUBTS = {
+    switches.GRAZES: (
+        "grazing", "", "it grazes there, so that nothing has a derivative from then on",
+    ),
+    switches.JUMPS: (
+        "grazing", "", "it jumps there, so that nothing has a derivative from then on",
+    ),
+    switches.TIE: (
+        "tie", "", "they hold on the side on which these follow each other as they did",
+    ),
+    switches.NO_SLOPE: (
+        "none", "the slope of a rate is not finite", "nothing has a derivative from then on",
+    ),
+}  # fmt: skip
 
-    def rate(self, y: list[float], mode: Modes, held: list[float]) -> FloatArray:
-        """Return dy/dt at this instant."""
-        none = np.zeros(0)
-        return self.linear.flow(self.t, y, mode, held, none, np.zeros((len(y), 0)))[0]
 
-    def through(self, each: _Operation, total: FloatArray, t_t: FloatArray) -> FloatArray:
-        """Take tangents through an edge or a tick."""
-        p = self.program.p
-        arguments = (*each.numbers, each.t, list(each.y), list(each.mode), p)
-        return self.linear.call(each.name, arguments, t_t, total)[1]
+@dataclass(eq=False)
+class _Call:
+    """What goes on with a run."""
 
-    def arrive(self, c: _Crossing) -> tuple[FloatArray, FloatArray]:
-        """Return the tangents at the moving instant of a crossing, and those of its time."""
-        f = self.rate(c.y, c.mode, c.held)
-        none = np.zeros(self.S.shape[1])
-        t_t, rates = self.instants(c.relations, c.y, c.mode, c.held, f, self.S, none)
-        if c.t - self.settled[0] <= SHORT * tick_at(c.t):
-            self.at_once(c, t_t, rates)
-        else:
-            self.check(c, t_t, rates)
-        return self.S + f[:, None] * t_t[0], t_t[0]
+    on: Callable[[], int]
+    course: Any  # has the numbers
+    arrays: Any  # has the columns
 
-    def at_once(self, c: _Crossing, t_t: FloatArray, rates: FloatArray) -> None:
-        """Let what changes right after a switch, because of it, change with it.
+    def make_room(self) -> None:
+        """Double the columns that are full, or will be soon."""
+        c, a = self.course, self.arrays
+        full = {"firings": c.fired + 1, "rows_t": c.rows + ROWS_AT_ONCE + 2}
+        full["doubt_t"] = c.doubts + 3
+        full["doubt_names"] = c.named + 3 * len(a.watch)
+        pairs = {"rows_t": ("rows_t", "table"), "doubt_t": ("doubt_t", "doubt_kind", "doubt_end")}
+        for name, needed in full.items():
+            if needed >= len(getattr(a, name)) and not (name == "rows_t" and len(a.times)):
+                for each in pairs.get(name, (name,)):
+                    column = getattr(a, each)
+                    if isinstance(column, list):
+                        column += copy.deepcopy(column)
+                    else:
+                        setattr(a, each, np.concatenate([column, np.zeros_like(column)]))
 
-        Its margin is zero at that switch, also after a change of the numbers. From there it may
-        grow as the square of the time, so that its rate says nothing.
-        """
-        _, before = self.settled
-        still = np.zeros(len(c.y))
-        places = [self.place(r) for r in c.relations]
-        _, slopes = self.linear.margins(
-            places, c.t, c.y, c.mode, c.held, still, np.diag(self.size), [self.linear.numbers[-1]]
-        )
-        natural = np.abs(slopes).sum(axis=1)[:, None] / self.directions.scales
-        left = np.abs(rates[:, None] * (before - t_t))
-        same = ~(left > NOTHING * natural)
-        t_t[same] = np.broadcast_to(before, t_t.shape)[same]
 
-    def instants(
-        self,
-        relations: Sequence[int],
-        y: list[float],
-        mode: Modes,
-        held: list[float],
-        f: FloatArray,
-        S: FloatArray,
-        t_t: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return for each relation how its zero moves, shape (relations, directions); its rate.
+_FLOATS = ("jumps", "before_jumps", "knots")
+_KEPT: dict[Any, Any] = {}
 
-        What is flat behind its zero, as max(N, 0), is taken from just before it.
-        """
-        places = [self.place(r) for r in relations]
-        t, columns = np.append(t_t, 1.0), np.column_stack([S, f])
-        _, g_t = self.linear.margins(places, self.t, y, mode, held, t, columns)
-        flat = g_t[:, -1] == 0.0
-        back = max(BACK * (self.t - self.before[0]), SHORT * tick_at(self.t))
-        if flat.any() and back < self.t - self.settled[0]:
-            earlier, y = self.t - back, (np.array(y) - back * f).tolist()
-            g_t[flat] = self.linear.margins(places, earlier, y, mode, held, t, columns)[1][flat]
-        with np.errstate(all="ignore"):
-            moved = -g_t[:, :-1] / g_t[:, -1:]
-        moved[g_t[:, :-1] == 0.0] = 0.0
-        return moved, g_t[:, -1]
 
-    def place(self, relation: int) -> int:
-        """Return the number of a relation where surfaces slid on are counted in their order."""
-        own = len(self.program.strict)
-        if relation < own:
-            return relation
-        c, side = divmod(relation - own, 2)
-        which = self.buffers.sliding.which
-        return own + 2 * sorted(which[: self.slid()]).index(which[c]) + side
-
-    def slid(self) -> int:
-        """Return on how many surfaces the arc before slid."""
-        return 0 if self.crossing is None else sum(self.crossing.mode[self.program.layout.slides])
-
-    def awaited(
-        self, each: _Operation, changed: list[int], total: FloatArray, t_t: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Go on to the instant of an edge, where it does not wait for what came first."""
-        own = [r for r in self.guards(each) if r in changed]
-        if not own or len(changed) == 1:
-            return total, t_t
-        mode: Modes = (*each.mode, *[0] * self.program.layout.surfaces)
-        held = self.linear.armed(self.t, each.y, mode)
-        f = self.rate(each.y, mode, held)
-        S = total - f[:, None] * t_t
-        later = self.instants(own[:1], each.y, mode, held, f, S, np.zeros_like(t_t))[0][0] - t_t
-        size = np.maximum(np.abs(t_t), np.abs(t_t + later))
-        if not (np.abs(later) > ALIKE * size).any():
-            return total, t_t
-        return total + f[:, None] * later, t_t + later
-
-    def guards(self, each: _Operation) -> list[int]:
-        """Return the relations in the guard of an edge."""
-        if each.numbers in self.guarded:
-            return self.guarded[each.numbers]
-        edge, machine = each.numbers
-        plan = self.program.plan
-        place = self.program.layout.bank(machine)
-        bank = next(b for b in plan.read.banks if b.name == place.name)
-        found = []
-        for comparison in comparisons(split(bank.edges[edge - place.first_edge].guard)):
-            if comparison in plan.relations.shared or comparison in plan.relations.own:
-                found.append(plan.relations.index(comparison, machine - place.first))
-        self.guarded[each.numbers] = found
-        return found
-
-    def check(self, c: _Crossing, t_t: FloatArray, rates: FloatArray) -> None:
-        """Note a crossing that grazes, or that is several ones at once."""
-        names = [
-            self.program.relations[r] if r < len(self.program.relations) else "the end of a slide"
-            for r in c.relations
-        ]
-        t0, y0 = self.before
-        if c.t > t0 and self.directions.count:
-            places = [self.place(r) for r in c.relations]
-            none, nothing = np.zeros(0), np.zeros((len(y0), 0))
-            start, end = (
-                self.linear.margins(places, t, y, c.mode, c.held, none, nothing)[0]
-                for t, y in ((t0, y0), (c.t, c.y))
-            )
-            mean = np.abs(end - start) / (c.t - t0)
-            slow = np.abs(rates) < GRAZING * mean
-            if slow.any():
-                name = names[int(np.argmax(slow))]
-                why = "grazes" if rates[slow].any() else "jumps"
-                reason = f"it {why} there, so that nothing has a derivative from then on"
-                self.doubts.append(DerivativeDoubt("grazing", c.t, f"{name} changes", reason))
-                t_t[:] = np.nan
-        apart = np.ptp(t_t, axis=0) if len(t_t) else np.zeros(0)
-        least = ROUNDING * (self.last - self.start[0]) / self.directions.scales
-        if (apart > ALIKE * np.max(np.abs(t_t), axis=0) + least).any():
-            self.doubts.append(
-                DerivativeDoubt(
-                    "tie",
-                    c.t,
-                    f"{' and '.join(dict.fromkeys(names))} changes",
-                    "they hold on the side on which these follow each other as they did",
-                )
-            )
+@functools.lru_cache(maxsize=64)
+def _guards(
+    plan: ByIdentity[Any], layout: ByIdentity[Any]
+) -> tuple[list[list[int]], list[int]]:
+    """Return the relations in the guards of all edges, and where those of a machine begin."""
+    found, first = list[list[int]](), list[int]()
+    relations = plan.it.relations
+    for machine in range(layout.it.n):
+        place = layout.it.bank(machine)
+        bank = next(b for b in plan.it.read.banks if b.name == place.name)
+        first.append(len(found) - place.first_edge)
+        for edge in bank.edges:
+            asked = comparisons(split(edge.guard))
+            known = [u for u in asked if u in relations.shared or u in relations.own]
+            found.append([relations.index(u, machine - place.first) for u in known])
+    most = max(map(len, found), default=0)
+    return [row + [-1] * (most - len(row)) for row in found], first

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.arguments import unknown
-from gms_fsm.gradients.following import Followed, Follower, RunAsRecorded
+from gms_fsm.gradients.following import Followed, follow
 from gms_fsm.gradients.linear import Directions, Linear
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.program import Program
@@ -59,10 +59,9 @@ class Sensitivities:
         options: LoopOptions,
         start: tuple[float, list[float], list[int], float],
         directions: Directions,
-        recorded: RunAsRecorded | None = None,
     ) -> Sensitivities:
         """Differentiate a run."""
-        return cls(directions, Follower(program, options, start, directions, recorded).follow())
+        return cls(directions, follow(program, options, start, directions))
 
     def column(self, to: str) -> int:
         """Return the place of a direction."""

@@ -4,19 +4,21 @@ A program's functions are assignments, branches and loops whose right-hand sides
 expression language. They are read back, and before each assignment stands that of its tangent: the
 partial derivatives of `gms_fsm.language.derivative` times the tangents of what it reads. Branches
 are those of the values. A tangent is a number, or an array with one entry per direction: the text
-is the same.
+is the same. In lanes there are several numbers, one after another, and the tangents of the state
+follow it in its own vector; the factors of all lanes are computed once.
 """
 
 from __future__ import annotations
 
 import ast
+import copy
 import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from gms_fsm.errors import ParameterError
-from gms_fsm.language import derivative, names_in, parse_value, spell
+from gms_fsm.language import ELEMENTARY, derivative, names_in, parse_value, spell
 from gms_fsm.language.tree import Number, Value
 from gms_fsm.lowering.generated import SIGNALS, CarefulText, ieee, load
 from gms_fsm.lowering.program import Program
@@ -24,6 +26,8 @@ from gms_fsm.lowering.program import Program
 MARK = "d__"  # before the name of a value: its tangent
 FUNCTIONS = ("flow", "observe", "margins", "normal", "act", "tick", "follow")
 VECTORS = ("y", "dy", "out")  # arrays that have tangents
+IN_THEIRS = ("y", "dy")  # in lanes these are in the same vector
+OF_LANES = ("flow", "margins", "normal", "act", "tick", "follow")
 ZERO = "0.0"
 ROUNDING = 1e-12  # a difference that is set to 0 below this, relative to its terms, keeps its slope
 
@@ -74,37 +78,157 @@ def tangents(program: Program, active: ActiveNumbers) -> Mapping[str, Any]:
 def _made(source: str, title: str, active: ActiveNumbers) -> Mapping[str, Any]:
     text = with_tangents(source, active)
     fast, careful = load(title, text, SIGNALS), CarefulText(title, text, SIGNALS)
-    functions = {name: ieee(fast[name], careful[name]) for name in FUNCTIONS}
-    return functions | {"text": text, "plain flow": fast["flow"]}
+    return {name: ieee(fast[name], careful[name]) for name in FUNCTIONS}
 
 
-def with_tangents(source: str, active: ActiveNumbers, names: Iterable[str] = FUNCTIONS) -> str:
+@functools.lru_cache(maxsize=64)
+def in_lanes(
+    source: str, title: str, active: ActiveNumbers, lanes: int, size: int
+) -> Mapping[str, Any]:
+    """Return the functions of a text with tangents in lanes, their ``"text"``, and ``"plain"``."""
+    text = with_tangents(source, active, OF_LANES, Lanes(lanes, size))
+    fast, careful = load(title, text, SIGNALS), CarefulText(title, text, SIGNALS)
+    plain = {name: fast[name] for name in OF_LANES}
+    made = {name: ieee(fast[name], careful[name]) for name in OF_LANES}
+    return made | {"text": text, "plain": plain}
+
+
+def with_tangents(
+    source: str,
+    active: ActiveNumbers,
+    names: Iterable[str] = FUNCTIONS,
+    lanes: Lanes | None = None,
+) -> str:
     """Return the text of some functions with tangents, and all constants of the text."""
     body: list[ast.stmt] = []
     for part in ast.parse(source).body:
         if isinstance(part, ast.FunctionDef):
             if part.name in names:
-                body.append(_function(part, active))
+                body.append(_function(part, active, lanes))
         else:
             body.append(part)
     return ast.unparse(ast.fix_missing_locations(ast.Module(body, [])))
 
 
-def _function(function: ast.FunctionDef, active: ActiveNumbers) -> ast.FunctionDef:
+def _function(
+    function: ast.FunctionDef, active: ActiveNumbers, lanes: Lanes | None
+) -> ast.FunctionDef:
     """Return a function with tangents."""
     filled = [arg.arg for arg in function.args.args if arg.arg in VECTORS[1:]]
     arguments = [MARK + name for name in ("t", "y", "p", *filled)]
+    if lanes is not None:
+        arguments = [each for each in arguments if each.removeprefix(MARK) not in IN_THEIRS]
     function.args.args += [ast.arg(name) for name in arguments]
-    writer = _TangentWriter(active, function)
+    writer = _TangentWriter(active, function, lanes)
     function.body = writer.block(function.body)
     return function
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """Tangents side by side.
+
+    Parameters
+    ----------
+    count : int
+        How many there are.
+    size : int
+        Length of the state, which its tangents follow.
+    """
+
+    count: int
+    size: int
+
+    def spread(
+        self, target: ast.expr, terms: list[tuple[str, str]], value: ast.stmt
+    ) -> list[ast.stmt]:
+        """Return the assignments of a tangent in all lanes, and then that of the value."""
+        factors, sums = [], []
+        for k, (factor, slope) in enumerate(terms):
+            if factor and not factor.isidentifier():
+                factors += ast.parse(f"g__{k} = {factor}").body
+                factor = f"g__{k}"
+            sums.append(f"{factor} * {slope}" if factor else slope)
+        text = f"{ast.unparse(target)} = {' + '.join(sums) or ZERO}"
+        made = [
+            _Lane(self, lane).visit(ast.parse(text).body[0]) for lane in range(self.count)
+        ]
+        return _once_each([*factors, value], len(factors), made)
+
+
+class _Lane(ast.NodeTransformer):
+    """Writes a tangent as one of the numbers of a lane."""
+
+    def __init__(self, lanes: Lanes, lane: int) -> None:
+        self.lanes, self.lane = lanes, lane
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        match node.value:
+            case ast.Name(id=name) if name.startswith(MARK):
+                plain, first = name.removeprefix(MARK), self.lane
+                if plain in IN_THEIRS:
+                    name, first = plain, self.lane + self.lanes.size
+                place = ast.unparse(self.generic_visit(node.slice))
+                count = self.lanes.count
+                return ast.Subscript(
+                    ast.Name(name, ast.Load()),
+                    ast.parse(f"({place}) * {count} + {first}", mode="eval").body,
+                    node.ctx,
+                )
+        return self.generic_visit(node)
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if not node.id.startswith(MARK):
+            return node
+        if node.id == f"{MARK}t":
+            return ast.Subscript(node, ast.Constant(self.lane), node.ctx)
+        return ast.Name(f"d{self.lane}__{node.id.removeprefix(MARK)}", node.ctx)
+
+
+def _once_each(
+    statements: list[ast.stmt], factors: int, lanes: list[ast.stmt]
+) -> list[ast.stmt]:
+    """Return factors, lanes and the value, with functions that stand there repeatedly called once.
+
+    One in an alternative may not be called where that is not chosen.
+    """
+    calls = _Calls()
+    for each in statements:
+        calls.visit(each)
+    names = {text: f"e__{k}" for k, (text, n) in enumerate(calls.found.items()) if n > 1}
+    before = [ast.parse(f"{name} = {text}").body[0] for text, name in names.items()]
+    put = _Calls(names)
+    statements = [put.visit(copy.deepcopy(each)) for each in statements]
+    return [*before, *statements[:factors], *lanes, *statements[factors:]]
+
+
+class _Calls(ast.NodeTransformer):
+    """Counts the calls of elementary functions, or puts names in their places."""
+
+    def __init__(self, names: Mapping[str, str] | None = None) -> None:
+        self.names = names
+        self.found: dict[str, int] = {}
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        match node.func:
+            case ast.Name(id=name) if name in ELEMENTARY:
+                text = ast.unparse(node)
+                self.found[text] = self.found.get(text, 0) + 1
+                if self.names and text in self.names:
+                    return ast.Name(self.names[text], ast.Load())
+        return self.generic_visit(node)
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        return node
 
 
 class _TangentWriter:
     """Writes the assignments of tangents of one function."""
 
-    def __init__(self, active: ActiveNumbers, function: ast.FunctionDef) -> None:
-        self.places = active
+    def __init__(
+        self, active: ActiveNumbers, function: ast.FunctionDef, lanes: Lanes | None
+    ) -> None:
+        self.places, self.lanes = active, lanes
         self.active = {"t", *VECTORS}
         while True:  # until no more names depend on something that has a tangent
             before = len(self.active)
@@ -114,7 +238,7 @@ class _TangentWriter:
                         ast.Assign(targets=[ast.Name(id=name)], value=value)
                         | ast.AugAssign(target=ast.Name(id=name), value=value)
                     ):
-                        if name not in self.active and self.tangent(value) != ZERO:
+                        if name not in self.active and self.terms(value):
                             self.active.add(name)
             if len(self.active) == before:
                 break
@@ -130,11 +254,14 @@ class _TangentWriter:
                     found += ast.parse(f"{MARK}shared, {MARK}own = {MARK}p").body
                     continue
                 case ast.Assign(targets=[target], value=value):
-                    found += self.assigned(target, self.tangent(value))
+                    found += self.assigned(target, self.terms(value), each)
+                    continue
                 case ast.AugAssign(target=ast.Name(id=name) as target, value=value):
-                    more = self.tangent(value)
-                    if name in self.active and more != ZERO:
-                        found += self.assigned(target, f"{MARK}{name} + {more}")
+                    more = self.terms(value)
+                    before = [("", f"{MARK}{name}")]
+                    if name in self.active and more:
+                        found += self.assigned(target, [*before, *more], each)
+                        continue
                 case ast.If() if _is_rounding(each):
                     found.append(each)
                     continue
@@ -145,37 +272,51 @@ class _TangentWriter:
             found.append(each)
         return found
 
-    def assigned(self, target: ast.expr, value: str) -> list[ast.stmt]:
-        """Return the assignment of the tangent of a target, if it has one."""
+    def assigned(
+        self, target: ast.expr, terms: list[tuple[str, str]], value: ast.stmt
+    ) -> list[ast.stmt]:
+        """Return an assignment after that of the tangent of its target, if it has one."""
         match target:
             case ast.Name(id=name) if name in self.active:
-                return ast.parse(f"{MARK}{name} = {value}").body
+                tangent = f"{MARK}{name}"
             case ast.Subscript(value=ast.Name(id=name), slice=place) if name in VECTORS:
-                return ast.parse(f"{MARK}{name}[{ast.unparse(place)}] = {value}").body
-        return []
+                tangent = f"{MARK}{name}[{ast.unparse(place)}]"
+            case _:
+                return [value]
+        if self.lanes is None or any(slope.startswith(f"{MARK}own[") for _, slope in terms):
+            return [*ast.parse(f"{tangent} = {total(terms)}").body, value]
+        made: Any = ast.parse(tangent, mode="eval").body
+        return self.lanes.spread(made, terms, value)
 
     # ------------------------------------------------------------------ expressions
     def tangent(self, value: ast.expr) -> str:
         """Return the tangent of an expression as text."""
+        terms = self.terms(value)
+        return f"({total(terms)})" if terms else ZERO
+
+    def terms(self, value: ast.expr) -> list[tuple[str, str]]:
+        """Return what a tangent is the sum of: factors, empty if 1, and tangents."""
         atoms = _Atoms(self)
         try:
             text = ast.unparse(atoms.visit(ast.parse(ast.unparse(value), mode="eval")))
         except _NoNumber:
-            return ZERO
+            return []
         if not any(slope != ZERO for _, slope in atoms.found.values()):
-            return ZERO
+            return []
         tree = parse_value(text, atoms.found)
         written = {name: here for name, (here, _) in atoms.found.items()}
         terms = []
         for name in sorted(names_in(tree), key=lambda each: int(each[1:])):
             slope = atoms.found[name][1]
             partial = derivative(tree, name) if slope != ZERO else None
-            if partial is None or partial == Number(0.0):
-                continue
-            terms.append(
-                slope if partial == Number(1.0) else f"{_factor(partial, written)} * {slope}"
-            )
-        return f"({' + '.join(terms)})" if terms else ZERO
+            if partial is not None and partial != Number(0.0):
+                terms.append(("" if partial == Number(1.0) else _factor(partial, written), slope))
+        return terms
+
+
+def total(terms: list[tuple[str, str]]) -> str:
+    """Spell a sum of terms."""
+    return " + ".join(f"{a} * {b}" if a else b for a, b in terms) or ZERO
 
 
 class _NoNumber(Exception):

@@ -13,7 +13,6 @@ import integrators
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.foundation.arguments import checked_path, refusing
 from gms_fsm.gradients.directions import directions_of
-from gms_fsm.gradients.following import RunAsRecorded
 from gms_fsm.gradients.linear import Directions
 from gms_fsm.gradients.sensitivities import Sensitivities
 from gms_fsm.lowering.program import equations, refuse_functions
@@ -205,7 +204,7 @@ def simulate(
         keeper.finish()
     trace = seen.trace()
     if asked:
-        trace = replace(trace, derived=derived(start, wanted, trace))
+        trace = replace(trace, derived=derived(start, wanted))
     return watched(trace, watching) if watching else trace
 
 
@@ -220,20 +219,13 @@ def simulated(start: Problem, until: str | None = None) -> Trace:
     return found if stop is None else stop.trace(found)
 
 
-def derived(start: Problem, directions: Directions, trace: Trace) -> Sensitivities:
+def derived(start: Problem, directions: Directions) -> Sensitivities:
     """Return the derivatives of a run that has reached its end."""
     options = start.options
     if start.output == "end":
         options = replace(options, times=[start.last])
     begin = start.t_start, start.y, start.mode, start.last
-    recorded = None
-    if start.chosen.engine == "compiled":  # once more, for its stops
-        ends = replace(start.chosen, output="t_eval", t_eval=[start.last])
-        once = replace(start, chosen=ends, options=replace(start.options, times=[start.last]))
-        stops = trace.stops if start.output == "t_eval" else simulated(once).stops
-        rows = trace.rows if start.output == "all" else stops
-        recorded = RunAsRecorded(rows.t.tolist(), np.asarray(rows.y), stops.t.tolist(), stops.y)
-    return Sensitivities.of(start.program, options, begin, directions, recorded)
+    return Sensitivities.of(start.program, options, begin, directions)
 
 
 def check_derivable(chosen: Settings, until: str | None = None) -> None:

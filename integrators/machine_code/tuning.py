@@ -6,7 +6,7 @@ from __future__ import annotations
 # putting them inline saves a third of the compilation and costs nothing; with those of the bracket
 # it does.
 NOT_INLINE = [
-    "arm", "normal", "observe", "switch", "tick", "_solve", "slope_on", "seize", "look",
+    "arm", "normal", "observe", "switch", "tick", "solve", "slope_on", "seize", "look",
     "scaled_size", "starting_step", "retry_factor", "next_on_grid", "raise_floor", "longest_next",
     "_search", "_put_wanted", "_put_firing", "_put_stop", "_begin_arc", "_choose_stop", "_fired",
     "_finish", "_jump", "_list", "_make_due", "_no_progress", "_often_changed",

@@ -43,12 +43,16 @@ from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.tree import Local, OuterEntry
 from integrators.machine_code.tuning import HOT, INLINE
-from integrators.runners import columns, observing, repeating, stepping, varying
+from integrators.runners import columns, observing, repeating, stepping
 from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
 from integrators.runners.stepping import Sample
 from integrators.sliding import Functions, Held, Sliding
 from integrators.steps import Coefficients
 from integrators.switching import jolts, sliding_bounds
+from integrators.tangents import motion
+from integrators.tangents import run as tangent_run
+from integrators.tangents import switches as tangent_switches
+from integrators.tangents.run import FollowArguments
 
 __all__ = [
     "CodeStore",
@@ -61,16 +65,16 @@ __all__ = [
     "edition",
     "engine",
     "example",
+    "follower",
     "is_known",
     "observer",
     "stepper",
-    "varier",
 ]
 
 # What is translated: the loop, and what it calls.
 LOOPS = (
     elementary, whole_numbers, steps, step_size, crossings, advance, sliding, sliding_bounds, jolts,
-    loop, columns, stepping, observing, repeating, varying,
+    loop, columns, stepping, observing, repeating, motion, tangent_switches, tangent_run,
 )  # fmt: skip
 _compiling = threading.RLock()  # runs may be in several threads
 # Arrays longer than this are not inside the block, and their lengths are variables.
@@ -543,9 +547,9 @@ def observer(
     return _made(text, rows, [entry], calls, store, notify), rows
 
 
-def varier(
-    text: str, arguments: varying.VaryArguments, store: CodeStore | None, notify: Callable[..., Any]
+def follower(
+    text: str, arguments: FollowArguments, store: CodeStore | None, notify: Callable[[str], None]
 ) -> CompiledFunction:
-    """Return `integrators.runners.varying.vary` as machine code, as `engine` does."""
-    entry = EntryPoint("entry", varying.vary, extra=("directions", "count"))
+    """Return `integrators.tangents.run.follow_run` as machine code, as `engine` does."""
+    entry = EntryPoint("entry", tangent_run.follow_run, extra=("steps",))
     return _made(text, arguments, [entry], (), store, notify)
