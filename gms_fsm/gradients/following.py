@@ -391,5 +391,6 @@ def _guards(
             asked = comparisons(split(edge.guard))
             known = [u for u in asked if u in relations.shared or u in relations.own]
             found.append([relations.index(u, machine - place.first) for u in known])
-    most = max(map(len, found), default=0)
+    found.append([-1])  # a table has a row
+    most = max(map(len, found))
     return [row + [-1] * (most - len(row)) for row in found], first

@@ -54,8 +54,8 @@ def _builder(machine: Any, speed: int) -> Any:
     llvm = _binding()
     options = llvm.create_pipeline_tuning_options(speed_level=speed)
     # Short loops are not worth vectors.
-    options.loop_vectorization = False
-    options.slp_vectorization = False
+    options.loop_vectorization = True
+    options.slp_vectorization = True
     return llvm.create_pass_builder(machine, options)
 
 

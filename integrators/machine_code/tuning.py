@@ -14,12 +14,12 @@ NOT_INLINE = [
     "_refuse", "_count", "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
     "advance", "_begin", "_impulse", "step_to",
     "arm_on", "drop", "entangled", "let_go", "look_back", "look_held", "release", "_ask", "_bears",
-    "_combine", "crossed", "_is_far", "leave", "let_go_in_time", "_values",
+    "_along", "arrive", "fix", "_combine", "crossed", "_is_far", "leave", "let_go_in_time", "_values",
 ]  # fmt: skip
 # A step calls these seven times. Inline, the slopes stay in registers: a tenth of the time.
 INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", "flow_on"), True)
 # Every step calls these.
-HOT = {
-    "advance", "first_change", "_bracket", "interpolate", "margins", "observe_rows", "_probe",
+HOT = {  #
+    "_along", "_error", "take_step", "rate_in_lanes", "advance", "first_change", "_bracket", "interpolate", "margins", "observe_rows", "_probe",
     "_search", "switch", "weighted_sum",
 }  # fmt: skip
