@@ -268,7 +268,7 @@ class _Search:
                 y, period = y + back[0], period + back[1]
                 back = 0.5 * back[0], 0.5 * back[1]
                 continue
-            M = derived(start, every).followed.end
+            M = derived(start, every, len(trace.rows)).followed.end
             end = np.array(trace.rows.y[-1])
             moved = np.zeros(size) if drift is None else drift * period
             R = Q.T @ ((end - y - moved) / self.sizes)

@@ -25,6 +25,8 @@ from gms_fsm.lowering import compiling
 from gms_fsm.lowering.program import Program, equations
 from integrators import METHODS, Functions, Held, LoopOptions, Tableau, hybrid, sliding_scratch
 from integrators.loop import ADVANCE, DONE, ROWS, Machines
+from integrators.machine_code.records import arrays_of, numbers_in, numbers_of, put_numbers
+from integrators.runners.states import begin
 from integrators.steps import Dense, Now, Scratch, coefficients
 from integrators.tangents import switches
 from integrators.tangents.motion import Course, LaneFunctions, Lanes, SlideLanes, Traced
@@ -87,6 +89,7 @@ def follow(
     options: LoopOptions,
     start: tuple[float, list[float], list[int], float],
     directions: Directions,
+    rows: int = 4 * ROWS_AT_ONCE,
 ) -> Followed:
     """Differentiate a run.
 
@@ -100,9 +103,11 @@ def follow(
         Time, state and modes at the start, and the last time.
     directions : Directions
         Those of the tangents.
+    rows : int
+        About how many it has.
     """
     inside = has_machine_code() and isinstance(options.method, Tableau)
-    run = _TangentRun(program, options, start, directions, inside)
+    run = _TangentRun(program, options, start, directions, inside, rows)
     return run.to_its_end(run.in_block() if inside else run.in_lists())
 
 
@@ -116,10 +121,12 @@ class _TangentRun:
         start: tuple[float, list[float], list[int], float],
         directions: Directions,
         compiled: bool,
+        rows: int,
     ) -> None:
         self.program, self.directions, self.compiled = program, directions, compiled
         self.start, self.wanted = start, options.times
         self.options = dataclasses.replace(options, times=None)
+        self.rows = rows + ROWS_AT_ONCE + 3 if self.wanted is None else len(self.wanted)
         self.lanes = LANES if directions.count >= LANES else 1
         self.wide = (directions.count // self.lanes + 1) * self.lanes  # the time has a place, too
         size, title = len(start[1]), program.plan.title
@@ -166,7 +173,6 @@ class _TangentRun:
         S, scales = np.zeros((size, wide)), np.ones(wide)
         S[:, :count], scales[:count] = self.directions.y, self.directions.scales
         guards, first_guards = _guards(ByIdentity(program.plan), ByIdentity(program.layout))
-        room = 4 * ROWS_AT_ONCE if self.wanted is None else len(self.wanted)
 
         def floats(*shape: int) -> Any:
             return outside(np.zeros(shape))
@@ -185,7 +191,7 @@ class _TangentRun:
             S=outside(S), t_t=floats(wide), t_before=floats(wide),
             slopes=floats(relations, wide), moves=outside(self.moves()), scales=outside(scales),
             times=outside(np.array(() if self.wanted is None else self.wanted, float)),
-            rows_t=floats(room), table=floats(room, size * wide), firings=floats(64, wide),
+            rows_t=floats(self.rows), table=floats(self.rows, size * wide), firings=floats(64, wide),
             doubt_t=floats(16), doubt_kind=places(16), doubt_end=places(16),
             doubt_names=places(16 * (relations + 1)),
         )  # fmt: skip
@@ -267,24 +273,49 @@ class _TangentRun:
 
     def in_block(self) -> _Call:
         """Return what goes on in machine code."""
-        from integrators.machine_code.layout import MemoryBlock
-
-        function, arguments = self.compiled_function(), self.arguments(lambda array: array)
-        block = MemoryBlock(function.layout, arguments)
+        ready = self.ready()
+        block = ready.block()
+        contents = self.put(block.contents)
 
         def call() -> int:
-            block.update(arguments)
-            return function(block, STEPS_AT_ONCE)
+            block.update(contents)
+            return ready.engine(block, STEPS_AT_ONCE)
 
-        return _Call(call, block.contents.functions.p.course, arguments.functions.p.course)
+        course = contents.functions.p.course
+        return _Call(call, course, course, lambda: ready.take_back(block))
 
-    def compiled_function(self) -> Any:
+    def put(self, contents: Any) -> Any:
+        """Put the numbers of this run into a block."""
+        program, options, (t, y, mode, last) = self.program, self.options, self.start
+        shared, own, tables = compiling.packed(program.p)
+        traced, b = contents.functions.p, contents.buffers
+        numbers = traced.functions
+        numbers.p[0][...], numbers.p[1][...] = shared, own
+        traced.rtol[0], traced.every[0] = options.rtol, self.wanted is None
+        traced.wide[0] = self.directions.count
+        plan = hybrid.plan_of(equations(program), t, last, options, len(mode))
+        b = b._replace(plan=compiling.plan_in_block(plan, b.plan))
+        begin(b, t, y, mode, last, options.floor or options.atol)
+        b.out.rows_t, b.out.rows_y = np.zeros(ROWS_AT_ONCE), np.zeros((ROWS_AT_ONCE, len(y)))
+        course = self.course(len(traced.course.watch), lambda array: array)
+        put_numbers(traced.course, counts := numbers_of(Course), numbers_in(course, counts))
+        for name in arrays_of(Course):
+            value = getattr(course, name)
+            if isinstance(value, np.ndarray):
+                setattr(traced.course, name, value)
+            elif name in ("y", "y_before", "sizes"):
+                getattr(traced.course, name)[:] = value
+        numbers = numbers._replace(p=(*numbers.p[:2], tables))
+        functions = contents.functions._replace(p=traced._replace(functions=numbers))
+        return contents._replace(functions=functions, buffers=b)
+
+    def ready(self) -> compiling.ReadyCode:
         """Return machine code for all runs that differ in numbers only."""
         from integrators.machine_code.layout import OuterArray
         from integrators.runners import compiled
 
-        program, lengths = self.program, tuple(map(len, self.program.p[1]))
-        text = self.tangents["text"]
+        program, text = self.program, self.tangents["text"]
+        lengths = len(program.p[0]), *map(len, program.p[1])
         key = program.source, text, lengths, self.options.method, self.options.located
         if key not in _KEPT:
             if len(_KEPT) >= compiling.MOST_ENGINES:
@@ -295,7 +326,8 @@ class _TangentRun:
 
             example = self.arguments(column)
             text = compiling.text_of(program, text)
-            _KEPT[key] = compiled.follower(text, example, compiling.store(), compiling.notify)
+            made = compiled.follower(text, example, compiling.store(), compiling.notify)
+            _KEPT[key] = compiling.ReadyCode(made, example, program.functions)
         return _KEPT[key]
 
     def to_its_end(self, call: _Call) -> Followed:
@@ -305,16 +337,18 @@ class _TangentRun:
             if event != ROWS:
                 raise RuntimeError(f"a run has ended otherwise than before: {event}")
             call.make_room()
-        count, arrays = self.directions.count, call.arrays
-        table = np.array(arrays.table[: c.rows], float).reshape(c.rows, -1, self.wide)
-        firings = np.array(arrays.firings[: c.fired], float).reshape(c.fired, self.wide)
-        return Followed(
-            np.array(arrays.rows_t[: c.rows], float),
-            table[:, :, :count].reshape(c.rows, len(self.start[1]), count),
+        count, arrays, size = self.directions.count, call.arrays, len(self.start[1])
+        table = np.asarray(arrays.table, float)[: c.rows].reshape(c.rows, size, self.wide)
+        firings = np.asarray(arrays.firings, float)[: c.fired].reshape(c.fired, self.wide)
+        found = Followed(
+            np.asarray(arrays.rows_t, float)[: c.rows],
+            table[:, :, :count],
             firings[:, :count],
-            np.array(arrays.S, float)[:, :count],
+            np.asarray(arrays.S, float)[:, :count],
             tuple(self.doubts(c, arrays)),
         )
+        call.over()
+        return found
 
     def doubts(self, c: Any, arrays: Any) -> Iterator[DerivativeDoubt]:
         """Yield what is doubtful, in words."""
@@ -354,6 +388,7 @@ class _Call:
     on: Callable[[], int]
     course: Any  # has the numbers
     arrays: Any  # has the columns
+    over: Callable[[], None] = lambda: None
 
     def make_room(self) -> None:
         """Double the columns that are full, or will be soon."""

@@ -59,9 +59,10 @@ class Sensitivities:
         options: LoopOptions,
         start: tuple[float, list[float], list[int], float],
         directions: Directions,
+        rows: int,
     ) -> Sensitivities:
-        """Differentiate a run."""
-        return cls(directions, follow(program, options, start, directions))
+        """Differentiate a run of about so many rows."""
+        return cls(directions, follow(program, options, start, directions, rows))
 
     def column(self, to: str) -> int:
         """Return the place of a direction."""

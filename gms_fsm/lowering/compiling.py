@@ -64,6 +64,24 @@ def _table(rows: list[list[float]]) -> FloatArray:
     return np.array(padded, dtype=np.float64).reshape(len(rows), length)
 
 
+def plan_in_block(plan: Any, places: Any) -> Any:
+    """Return a plan whose lists are arrays, those inside the block in their places."""
+    places.control.atol[:], places.discrete[:] = plan.control.atol, plan.discrete
+    places.kinds[:] = plan.kinds
+    jumps = len(plan.jumps) > 0
+    places.relaxing[:] = plan.relaxing
+    return plan._replace(
+        kinds=places.kinds,
+        control=plan.control._replace(atol=places.control.atol),
+        discrete=places.discrete,
+        relaxing=places.relaxing,
+        jumps=plan.jumps if jumps else places.jumps,
+        before_jumps=plan.before_jumps if jumps else places.before_jumps,
+        ticks=plan.ticks if jumps else places.ticks,
+        knots=np.array(plan.knots, dtype=np.float64) if plan.knots else places.knots,
+    )
+
+
 def engine(
     program: Program, run: RecordArguments, counting: Counting | None = None
 ) -> CompiledFunction:

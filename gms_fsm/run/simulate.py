@@ -204,7 +204,7 @@ def simulate(
         keeper.finish()
     trace = seen.trace()
     if asked:
-        trace = replace(trace, derived=derived(start, wanted))
+        trace = replace(trace, derived=derived(start, wanted, len(trace.rows)))
     return watched(trace, watching) if watching else trace
 
 
@@ -219,13 +219,13 @@ def simulated(start: Problem, until: str | None = None) -> Trace:
     return found if stop is None else stop.trace(found)
 
 
-def derived(start: Problem, directions: Directions) -> Sensitivities:
-    """Return the derivatives of a run that has reached its end."""
+def derived(start: Problem, directions: Directions, rows: int) -> Sensitivities:
+    """Return the derivatives of a run of about so many rows that has reached its end."""
     options = start.options
     if start.output == "end":
         options = replace(options, times=[start.last])
     begin = start.t_start, start.y, start.mode, start.last
-    return Sensitivities.of(start.program, options, begin, directions)
+    return Sensitivities.of(start.program, options, begin, directions, rows)
 
 
 def check_derivable(chosen: Settings, until: str | None = None) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from integrators.loop import Buffers, Memory
 from integrators.machine_code.records import arrays_of, numbers_in, numbers_of, put_numbers
-from integrators.steps import Now
+from integrators.steps import Now, Vector
 
 # Numbers of the loop's state, in the order in which files and arrays have them.
 CLOCK, COUNTS = tuple(numbers_of(Now)), tuple(numbers_of(Memory))
@@ -65,3 +65,13 @@ def beginning(t: float, t_end: float) -> dict[str, float]:
         "latest": abs(t_end),
         "seen": math.inf,
     }
+
+
+def begin(
+    b: Buffers, t: float, y: Sequence[float], mode: Sequence[int], t_end: float, floor: Vector
+) -> None:
+    """Put the start of a run into buffers, which are otherwise as they were at the beginning."""
+    begun = beginning(t, t_end)
+    put_numbers(b.now, begun.keys(), begun.values())
+    b.now.y[:], b.now.mode[:], b.memory.anchor[:] = y, mode, y
+    b.now.floor[:] = floor

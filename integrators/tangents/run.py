@@ -38,7 +38,7 @@ __all__ = ["FollowArguments", "follow_run"]
 
 SAFE, LEAST, MOST = 0.9, 0.2, 3.0  # of the step control
 ORDER = 5
-LOOSE = 10.0  # tolerances that a step of tangents may take
+LOOSE = 30.0  # tolerances that a step of tangents may take
 SHARE = 1e-3  # of the largest tangent that a component could have: what is small beside it
 ROUNDING = 2.0**-52
 SMALLEST = 1e-300

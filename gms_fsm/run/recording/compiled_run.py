@@ -188,7 +188,7 @@ class Columns:
         plan = hybrid.plan_of(
             equations(start.program), start.t_start, start.last, start.options, len(start.mode)
         )
-        self.buffers: hybrid.Buffers = b._replace(plan=_as_arrays(plan, b.plan))
+        self.buffers: hybrid.Buffers = b._replace(plan=compiled.plan_in_block(plan, b.plan))
         out: Any = b.out  # arrays
         out.every_step = start.options.times is None
         out.times = np.asarray(() if out.every_step else start.options.times, float)
@@ -249,11 +249,8 @@ class Columns:
     def _begin(self) -> None:
         """Write the start into the buffers, which are otherwise as they were at the beginning."""
         start = self.start
-        b: Any = self.buffers  # arrays
-        begun = states.beginning(start.t_start, start.last)
-        put_numbers(b.now, begun.keys(), begun.values())
-        b.now.y[:], b.now.mode[:], b.memory.anchor[:] = start.y, start.mode, start.y
-        b.now.floor[:] = start.options.floor or start.options.atol
+        floor = start.options.floor or start.options.atol
+        states.begin(self.buffers, start.t_start, start.y, start.mode, start.last, floor)
 
     def empty(self) -> None:
         """Empty the columns and return to the start."""
@@ -497,28 +494,6 @@ def example_of(start: Problem, counting: Counting | None = None) -> RecordArgume
         layout.modes,
         None if counting is None else compiled.count_of(program, counting),
     )
-
-
-def _as_arrays(plan: Any, places: Any) -> Any:
-    """Return a plan whose lists are arrays, those inside the block in their places."""
-    places.control.atol[:], places.discrete[:] = plan.control.atol, plan.discrete
-    places.kinds[:] = plan.kinds
-    jumps = len(plan.jumps) > 0
-    places.relaxing[:] = plan.relaxing
-    return plan._replace(
-        kinds=places.kinds,
-        control=plan.control._replace(atol=places.control.atol),
-        discrete=places.discrete,
-        relaxing=places.relaxing,
-        jumps=plan.jumps if jumps else places.jumps,
-        before_jumps=plan.before_jumps if jumps else places.before_jumps,
-        ticks=plan.ticks if jumps else places.ticks,
-        knots=_floats(plan.knots) if plan.knots else places.knots,
-    )
-
-
-def _floats(numbers: Any) -> Any:
-    return np.array(numbers, dtype=np.float64)
 
 
 def _integers(numbers: Any) -> Any:
