@@ -84,6 +84,7 @@ class Followed:
     end: FloatArray
     doubts: tuple[DerivativeDoubt, ...]
 
+
 def follow(
     program: Program,
     options: LoopOptions,
@@ -142,7 +143,7 @@ class _TangentRun:
         shared, own, tables = compiling.packed(program.p)
         p = (shared.tolist(), own.tolist(), outside(tables)) if self.compiled else program.p
         names = first, "arm", "margins", "normal", "follow"
-        numbers = Functions(*(made[name] for name in names), p)
+        numbers = Functions(*[made[name] for name in names], p)
         machines = [made[name] for name in ("switch", "act", "tick", "jolts", "observe")]
         b = hybrid.buffers(equations(program), t, y, mode, last, self.options, ROWS_AT_ONCE)
         relations, plan = len(b.relations.watch), b.plan
@@ -191,8 +192,8 @@ class _TangentRun:
             S=outside(S), t_t=floats(wide), t_before=floats(wide),
             slopes=floats(relations, wide), moves=outside(self.moves()), scales=outside(scales),
             times=outside(np.array(() if self.wanted is None else self.wanted, float)),
-            rows_t=floats(self.rows), table=floats(self.rows, size * wide), firings=floats(64, wide),
-            doubt_t=floats(16), doubt_kind=places(16), doubt_end=places(16),
+            rows_t=floats(self.rows), table=floats(self.rows, size * wide),
+            firings=floats(64, wide), doubt_t=floats(16), doubt_kind=places(16), doubt_end=places(16),
             doubt_names=places(16 * (relations + 1)),
         )  # fmt: skip
 
@@ -328,7 +329,8 @@ class _TangentRun:
             text = compiling.text_of(program, text)
             made = compiled.follower(text, example, compiling.store(), compiling.notify)
             _KEPT[key] = compiling.ReadyCode(made, example, program.functions)
-        return _KEPT[key]
+        found: compiling.ReadyCode = _KEPT[key]
+        return found
 
     def to_its_end(self, call: _Call) -> Followed:
         """Go on to the end, and return what has been kept."""
@@ -359,9 +361,7 @@ class _TangentRun:
             first = end
             said = dict.fromkeys(names[r] if r < len(names) else SLIDE_ENDS for r in which)
             word, place, reason = DOUBTS[int(kind)]
-            yield DerivativeDoubt(
-                word, float(t), place or f"{' and '.join(said)} changes", reason
-            )
+            yield DerivativeDoubt(word, float(t), place or f"{' and '.join(said)} changes", reason)
 
 
 SLIDE_ENDS = "the end of a slide"
@@ -412,9 +412,7 @@ _KEPT: dict[Any, Any] = {}
 
 
 @functools.lru_cache(maxsize=64)
-def _guards(
-    plan: ByIdentity[Any], layout: ByIdentity[Any]
-) -> tuple[list[list[int]], list[int]]:
+def _guards(plan: ByIdentity[Any], layout: ByIdentity[Any]) -> tuple[list[list[int]], list[int]]:
     """Return the relations in the guards of all edges, and where those of a machine begin."""
     found, first = list[list[int]](), list[int]()
     relations = plan.it.relations

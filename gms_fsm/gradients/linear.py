@@ -61,7 +61,6 @@ class _Slide(NamedTuple):
     sigma: FloatArray
     d_sigma: FloatArray
     N: FloatArray  # the gradients of the surfaces
-    H: FloatArray  # half the differences of the flows on both sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,19 +103,18 @@ class Linear:
         t_t: FloatArray,
         y_t: FloatArray,
         size: int = 0,
-        p_t: list[Any] | None = None,
     ) -> tuple[list[float], FloatArray]:
         """Call a function; return what it fills, or y without a size, and the tangents of that.
 
         ``t_t`` has shape (columns,), ``y_t`` (m, columns); the last of the directions + 1 columns
-        is the time's, and may be missing. The tangents of the numbers may be given for each.
+        is the time's, and may be missing.
         """
         function, count = self.functions[name], t_t.size
         filled: list[float] = [0.0] * size
         if count == 0:
             self.program.ieee[name](*arguments, *([filled] if size else []))
             return filled, np.zeros((size or y_t.shape[0], 0))
-        if count > FEW and p_t is None:
+        if count > FEW:
             slopes: list[Any] = [0.0] * size
             tangent = list(y_t)
             every = self._arrays[count]
@@ -129,7 +127,7 @@ class Linear:
                 place[:] = row
             return filled, made
         made = np.empty((size or y_t.shape[0], count))
-        columns, given, numbers = y_t.T.tolist(), arguments, p_t or self.numbers
+        columns, given, numbers = y_t.T.tolist(), arguments, self.numbers
         for c in range(count):
             column = columns[c]
             slope = [0.0] * size
@@ -172,10 +170,9 @@ class Linear:
         held: list[float],
         t_t: FloatArray,
         y_t: Any,
-        p_t: list[Any] | None = None,
     ) -> tuple[list[float], FloatArray]:
         arguments = (t, y, mode, held, self.program.p)
-        return self.call("flow", arguments, t_t, y_t, len(y), p_t)
+        return self.call("flow", arguments, t_t, y_t, len(y))
 
     def along(
         self,
@@ -185,7 +182,6 @@ class Linear:
         held: list[float],
         t_t: FloatArray,
         y_t: Any,
-        p_t: list[Any] | None = None,
     ) -> _Slide:
         """Return the slope along surfaces, as `integrators.sliding` has it, and the sigmas."""
         program, modes, signs = self.program, list(mode), list(held)
@@ -197,14 +193,14 @@ class Linear:
         f = np.zeros(size)
         slope = np.zeros((size, t_t.size))
         if len(which) > 1:
-            one, slopes = self._plain(t, y, modes, signs, t_t, y_t, p_t)
+            one, slopes = self._plain(t, y, modes, signs, t_t, y_t)
             f, slope = (1.0 - len(which)) * np.array(one), (1.0 - len(which)) * slopes
         halves, half_slopes, normals, normal_slopes = [], [], [], []
         for k in which:
             sides = []
             for side in (1.0, -1.0):
                 kept = go_to(surfaces, k, side, signs, modes)
-                sides.append(self._plain(t, y, modes, signs, t_t, y_t, p_t))
+                sides.append(self._plain(t, y, modes, signs, t_t, y_t))
                 go_back(surfaces, k, kept, signs, modes)
             (up, up_t), (low, low_t) = sides
             f += 0.5 * (np.array(up) + low)
@@ -212,7 +208,7 @@ class Linear:
             halves.append(0.5 * (np.array(up) - low))
             half_slopes.append(0.5 * (up_t - low_t))
             arguments = (k, t, y, modes, program.p)
-            g, g_t = self.call("normal", arguments, t_t, y_t, size + 1, p_t)
+            g, g_t = self.call("normal", arguments, t_t, y_t, size + 1)
             normals.append(np.array(g))
             normal_slopes.append(g_t)
         H, dH = np.array(halves), np.array(half_slopes)
@@ -228,21 +224,7 @@ class Linear:
             sigma, d_sigma = np.full(len(which), np.nan), np.full((len(which), t_t.size), np.nan)
         f = f + sigma @ H
         slope = slope + np.einsum("cp,cj->jp", d_sigma, H) + np.einsum("c,cjp->jp", sigma, dH)
-        return _Slide(f, slope, sigma, d_sigma, N[:, :-1], H)
-
-    def onto(
-        self, t: float, y: list[float], mode: Modes, held: list[float], S: FloatArray
-    ) -> FloatArray:
-        """Return tangents on the surfaces slid on: what leads off them has come back at once."""
-        program, still = self.program, np.zeros(S.shape[1])
-        which = np.flatnonzero(mode[program.layout.slides]).tolist()
-        if not which:
-            return S
-        slide = self.along(t, y, mode, held, still, S)
-        above = [program.surfaces.above[k] for k in which]
-        _, off = self.margins(above, t, y, mode, held, still, S)
-        back: FloatArray = slide.H.T @ np.linalg.lstsq(slide.N @ slide.H.T, off, rcond=None)[0]
-        return S - back
+        return _Slide(f, slope, sigma, d_sigma, N[:, :-1])
 
     # ------------------------------------------------------------------ switches
     def armed(self, t: float, y: list[float], mode: Modes) -> list[float]:
@@ -258,11 +240,9 @@ class Linear:
         held: list[float],
         t_t: FloatArray,
         y_t: FloatArray,
-        p_t: list[Any] | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Return the margins of relations, and of the sigma that ends a slide; their tangents."""
         program, own = self.program, len(self.program.strict)
-        every = None if p_t is None else p_t * t_t.size
         watch = [0] * own
         for r in relations:
             if r < own:
@@ -270,9 +250,9 @@ class Linear:
         arguments = (t, y, list(mode), program.p, watch)
         values, slopes = [0.0] * own, np.zeros((own, t_t.size))
         if any(watch):
-            values, slopes = self.call("margins", arguments, t_t, y_t, own, every)
+            values, slopes = self.call("margins", arguments, t_t, y_t, own)
         if max(relations) >= own:
-            slide = self.along(t, y, mode, held, t_t, y_t, every)
+            slide = self.along(t, y, mode, held, t_t, y_t)
             sigma, d_sigma = slide.sigma, slide.d_sigma
         g, g_t = [], []
         for r in relations:

@@ -150,9 +150,7 @@ class Lanes:
                 factor = f"g__{k}"
             sums.append(f"{factor} * {slope}" if factor else slope)
         text = f"{ast.unparse(target)} = {' + '.join(sums) or ZERO}"
-        made = [
-            _Lane(self, lane).visit(ast.parse(text).body[0]) for lane in range(self.count)
-        ]
+        made = [_Lane(self, lane).visit(ast.parse(text).body[0]) for lane in range(self.count)]
         return _once_each([*factors, value], len(factors), made)
 
 
@@ -185,9 +183,7 @@ class _Lane(ast.NodeTransformer):
         return ast.Name(f"d{self.lane}__{node.id.removeprefix(MARK)}", node.ctx)
 
 
-def _once_each(
-    statements: list[ast.stmt], factors: int, lanes: list[ast.stmt]
-) -> list[ast.stmt]:
+def _once_each(statements: list[ast.stmt], factors: int, lanes: list[ast.stmt]) -> list[ast.stmt]:
     """Return factors, lanes and the value, with functions that stand there repeatedly called once.
 
     One in an alternative may not be called where that is not chosen.

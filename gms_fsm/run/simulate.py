@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
 
-import numpy as np
-
 import integrators
 from gms_fsm.errors import ParameterError, SignalError
 from gms_fsm.foundation.arguments import checked_path, refusing

@@ -14,12 +14,13 @@ NOT_INLINE = [
     "_refuse", "_count", "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
     "advance", "_begin", "_impulse", "step_to",
     "arm_on", "drop", "entangled", "let_go", "look_back", "look_held", "release", "_ask", "_bears",
-    "_along", "arrive", "fix", "_combine", "crossed", "_is_far", "leave", "let_go_in_time", "_values",
+    "_along", "arrive", "fix", "slide_in_lanes", "margins_in_lanes", "_await",
+    "_combine", "crossed", "_is_far", "leave", "let_go_in_time", "_values",
 ]  # fmt: skip
 # A step calls these seven times. Inline, the slopes stay in registers: a tenth of the time.
 INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", "flow_on"), True)
 # Every step calls these.
-HOT = {  #
-    "_along", "_error", "take_step", "rate_in_lanes", "advance", "first_change", "_bracket", "interpolate", "margins", "observe_rows", "_probe",
-    "_search", "switch", "weighted_sum",
+HOT = {
+    "advance", "_along", "first_change", "_bracket", "_error", "interpolate", "margins",
+    "observe_rows", "_probe", "rate_in_lanes", "_search", "switch", "take_step", "weighted_sum",
 }  # fmt: skip

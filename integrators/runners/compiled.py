@@ -106,12 +106,15 @@ class EntryPoint(NamedTuple):
         The parts of the block that are its first arguments, as in `BlockLayout.part`; all if empty.
     extra : tuple of str
         Integers that are passed besides the block.
+    vectors : bool
+        Whether it computes numbers side by side.
     """
 
     name: str
     function: Callable[..., Any]
     parts: str = ""
     extra: tuple[str, ...] = ()
+    vectors: bool = False
 
 
 RECORD = "functions machines buffers log recorded tally"
@@ -296,7 +299,12 @@ def _object(
             translator = translated(layout, entries, each=each)
             hot = {name for name, own in translator.origins.items() if own in HOT}
             made = llvm_text(translator.module)
-        content = objects.compiled_at_once(made) if at_once else objects.compiled(made, hot)
+        vectors = entries[0].vectors
+        content = (
+            objects.compiled_at_once(made)
+            if at_once
+            else objects.compiled(made, hot, vectors=vectors)
+        )
         if store is not None:
             store.put(name, content)
         notify(f"compiled in {time.perf_counter() - started:.1f} s")
@@ -551,5 +559,5 @@ def follower(
     text: str, arguments: FollowArguments, store: CodeStore | None, notify: Callable[[str], None]
 ) -> CompiledFunction:
     """Return `integrators.tangents.run.follow_run` as machine code, as `engine` does."""
-    entry = EntryPoint("entry", tangent_run.follow_run, extra=("steps",))
+    entry = EntryPoint("entry", tangent_run.follow_run, extra=("steps",), vectors=True)
     return _made(text, arguments, [entry], (), store, notify)

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from integrators.loop import DONE, FIRED, FIRING, ROWS, SLID, STOPPED, Buffers, run_to_event
 from integrators.advance import CROSSED, TICK
+from integrators.loop import DONE, FIRED, FIRING, ROWS, SLID, STOPPED, Buffers, run_to_event
 from integrators.sliding import Functions, Held, flow_on, follow_on, margins_on
 from integrators.step_size import INFINITY, root_of
 from integrators.steps import (
@@ -29,7 +29,6 @@ from integrators.tangents.switches import (
     arrive,
     doubt,
     fix,
-    functions_of,
     rate_of_instant,
     slide_as,
 )
@@ -219,7 +218,7 @@ def _along(own: Held, b: Buffers, first: int, group: int) -> float:
     traced: Any = own.functions.p
     c, w, out = traced.course, traced.lanes, b.out
     motion, size = ArcMotion(rate_in_lanes, margins_on, own, follow_on), len(c.y)
-    now, lanes, bad = w.now, len(w.t), INFINITY
+    now, bad = w.now, INFINITY
     place, wanted = c.rows, c.next_time
     h = out.rows_t[out.row - 1] - c.t
     now.t = c.t

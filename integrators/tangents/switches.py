@@ -18,7 +18,6 @@ from integrators.tangents.motion import (
     Traced,
     margins_in_lanes,
     put_group,
-    rate_in_lanes,
     slide_in_lanes,
     take_group,
 )
@@ -36,30 +35,32 @@ GRAZING = 1e-4  # of the mean rate of a margin over its last step
 # --------------------------------------------------------------------------- machines that note
 # The loop passes its parameters to all functions of a system: here these are traced ones.
 def flow(t: float, y: Vector, mode: list[int], held: Vector, p: Traced, dy: Vector) -> None:
+    """Fill the rates of a state."""
     p.functions.flow(t, y, mode, held, p.functions.p, dy)
 
 
 def arm(t: float, y: Vector, mode: list[int], p: Traced, held: Vector, watch: list[int]) -> None:
+    """Hold signs, and flag what is watched."""
     p.functions.arm(t, y, mode, p.functions.p, held, watch)
 
 
-def margins(
-    t: float, y: Vector, mode: list[int], p: Traced, watch: list[int], out: Vector
-) -> None:
+def margins(t: float, y: Vector, mode: list[int], p: Traced, watch: list[int], out: Vector) -> None:
+    """Fill margins."""
     p.functions.margins(t, y, mode, p.functions.p, watch, out)
 
 
 def normal(k: int, t: float, y: Vector, mode: list[int], p: Traced, out: Vector) -> None:
+    """Fill a normal."""
     p.functions.normal(k, t, y, mode, p.functions.p, out)
 
 
 def follow(t: float, y: Vector, mode: list[int], held: Vector, p: Traced) -> None:
+    """Set what others determine."""
     p.functions.follow(t, y, mode, held, p.functions.p)
 
 
-def ask(
-    t: float, y: Vector, mode: list[int], p: Traced, jolt: list[int], edges: list[int]
-) -> None:
+def ask(t: float, y: Vector, mode: list[int], p: Traced, jolt: list[int], edges: list[int]) -> None:
+    """Ask the machines."""
     p.machines.ask(t, y, mode, p.functions.p, jolt, edges)
 
 
@@ -73,6 +74,7 @@ def jolts(
     was: Vector,
     jolt: list[int],
 ) -> None:
+    """Compare velocities."""
     p.machines.jolts(t, y, mode, p.functions.p, floor, mark, was, jolt)
 
 
@@ -87,9 +89,7 @@ def act(edge: int, machine: int, t: float, y: Vector, mode: list[int], p: Traced
     c.fired += 1
     for group in range(len(c.moves)):
         _take_moving(p, group, y, mode)
-        p.tangents.act(
-            edge, machine, t, w.now.y, w.mode, p.functions.p, w.t, (w.shared, w.own)
-        )
+        p.tangents.act(edge, machine, t, w.now.y, w.mode, p.functions.p, w.t, (w.shared, w.own))
         put_group(p, group)
     p.machines.act(edge, machine, t, y, mode, p.functions.p)
 

@@ -5,9 +5,12 @@ A difference of two runs has an error of its own: it is taken from how far two s
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from gms_fsm.gradients import following
 from tests import corpus
 from tests.differences import compared, names_of
 from tests.helpers import FASTEST
@@ -41,15 +44,14 @@ def test_rows_keep_their_bits(name: str):
     assert np.array_equal(with_them.t, without.t)
 
 
-@pytest.mark.parametrize("name", ["pulled mass", "system servo", "sliding"])
-def test_engines_agree(name: str):
+@pytest.mark.parametrize("name", ["system servo", "sliding", "system impact"])
+def test_they_have_equal_bits_in_all_engines(name: str, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("llvmlite")
-    run, names = corpus.run(name), names_of(corpus.run(name), 2)
-    one, other = (
-        run(engine=engine, sensitivities=names).derived.followed
-        for engine in ("compiled", "ifelse")
-    )
-    assert one.rows.shape == other.rows.shape
-    scale = np.abs(other.rows).max(axis=(0, 1)) + 1e-300
-    assert np.abs((one.rows - other.rows) / scale).max() < 1e-7
-    np.testing.assert_allclose(one.times, other.times, rtol=1e-6, atol=1e-9 * scale.max())
+    run = replace(corpus.run(name), t_end=0.3 * corpus.run(name).t_end)
+    names = names_of(run, 5)  # more than stand in lanes
+    compiled = run(engine="compiled", sensitivities=names).derived.followed
+    monkeypatch.setattr(following, "has_machine_code", lambda: False)
+    text = run(engine="ifelse", sensitivities=names).derived.followed
+    for part in ("t", "rows", "times", "end"):
+        one, other = getattr(compiled, part), getattr(text, part)
+        np.testing.assert_array_equal(one, other, strict=True)
