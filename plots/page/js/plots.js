@@ -8,6 +8,7 @@ const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
 const elementStep = (i, n) => (n > 1 ? Math.round((i * (COLOURS - 1)) / (n - 1)) : 0); // of the ramp from the first element to the last
 const RUNS = [{ stroke: "--ink" }, { stroke: "--soft", dash: [7, 4] }]; // lines of the first run and of the second
 const MOST_POINTS = 60000; // of lines that are drawn again when another element is selected
+const COARSE = 2; // px of a column
 let sketching = false; // while the run changes with every picture
 let pointed = null, pinned = null; // frames: under the mouse, and where two runs first differ
 
@@ -95,9 +96,10 @@ class TimePlots {
     }
     zooming = true; // of its own accord
     this.sketch(sketching);
-    const columns = sketching ? columnsOf(this.width()) : null, t = columns ? Float64Array.from(columns.ends, (k) => frames.t[k]) : frames.t;
+    const columns = sketching ? columnsOf(this.width() / COARSE) : null, t = columns ? Float64Array.from(columns.ends, (k) => frames.t[k]) : frames.t;
     for (const { plot, lines } of this.plots) {
-      plot.setData([t, ...lines.map((line) => (columns ? alongColumns(line, columns) : alongFrames(line)))], false);
+      const along = (line, k) => (!columns ? alongFrames(line) : plot.series[k + 1].show ? alongColumns(line, columns) : []);
+      plot.setData([t, ...lines.map(along)], false);
       plot.setScale("x", { ...span });
     }
     zooming = false;
@@ -350,6 +352,7 @@ class TimePane extends TimePlots {
         if (alone && !of.run.ghost && of.n > 1) each.width = (on ? 2.6 : 1.2) * large;
         else if (runs.length > 1 && each.show !== on) this.inner.setSeries(first + k, { show: on });
       });
+      if (this.sketched) this.renew(); // which leaves out what is not shown
       if (alone && contact.n > 1 && frames.t.length * contact.n < MOST_POINTS) this.inner.redraw(false, false); // else with the next zoom
     }
     this.tracks.forEach(({ ribbon, i }) => {

@@ -40,13 +40,13 @@ function ask() {
   const { number, numbers, then } = live.waiting;
   Object.assign(live, { waiting: null, busy: true });
   const late = setTimeout(() => $("#numbers").classList.add("busy"), LATE);
-  live.worker.onmessage = ({ data: { found, took } }) => {
+  live.worker.onmessage = ({ data: { found, took } }) => (document.hidden ? setTimeout : requestAnimationFrame)(() => {
     clearTimeout(late);
     $("#numbers").classList.remove("busy");
     Object.assign(live, { busy: false, took });
     if (live.waiting) ask(); // while this one is drawn
     then(found, number);
-  };
+  });
   live.worker.postMessage({ number, numbers });
 }
 
