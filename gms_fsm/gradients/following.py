@@ -92,21 +92,7 @@ def follow(
     directions: Directions,
     rows: int = 4 * ROWS_AT_ONCE,
 ) -> Followed:
-    """Differentiate a run.
-
-    Parameters
-    ----------
-    program : Program
-        Its program.
-    options : LoopOptions
-        How it integrates, and which rows it keeps.
-    start : tuple
-        Time, state and modes at the start, and the last time.
-    directions : Directions
-        Those of the tangents.
-    rows : int
-        About how many it has.
-    """
+    """Differentiate a run of about so many rows."""
     inside = has_machine_code() and isinstance(options.method, Tableau)
     run = _TangentRun(program, options, start, directions, inside, rows)
     return run.to_its_end(run.in_block() if inside else run.in_lists())
@@ -128,7 +114,7 @@ class _TangentRun:
         self.start, self.wanted = start, options.times
         self.options = dataclasses.replace(options, times=None)
         self.rows = rows + ROWS_AT_ONCE + 3 if self.wanted is None else len(self.wanted)
-        self.lanes = LANES if directions.count >= LANES else 1
+        self.lanes = LANES if directions.count > 1 else 1
         self.wide = (directions.count // self.lanes + 1) * self.lanes  # the time has a place, too
         size, title = len(start[1]), program.plan.title
         self.tangents = in_lanes(program.source, title, directions.places, self.lanes, size)
@@ -247,8 +233,8 @@ class _TangentRun:
         for k, change in d.shared.items():
             rows[k, : d.count] = change
         for k, changes in d.own.items():
-            first = len(shared) + k * longest
-            rows[first : first + len(changes), : d.count] = changes
+            for i, change in enumerate(changes):
+                rows[len(shared) + k * longest + i, : d.count] = change
         groups = rows.reshape(len(rows), -1, self.lanes).transpose(1, 0, 2)
         return np.ascontiguousarray(groups.reshape(groups.shape[0], -1))
 
@@ -354,11 +340,10 @@ class _TangentRun:
 
     def doubts(self, c: Any, arrays: Any) -> Iterator[DerivativeDoubt]:
         """Yield what is doubtful, in words."""
-        first, names = 0, self.program.relations
-        for k in range(c.doubts):
-            t, kind, end = arrays.doubt_t[k], arrays.doubt_kind[k], arrays.doubt_end[k]
-            which = [int(r) for r in arrays.doubt_names[first:end]]
-            first = end
+        names = self.program.relations
+        ends = [int(end) for end in arrays.doubt_end[: c.doubts]]
+        named = np.split(np.asarray(arrays.doubt_names, int), ends)[:-1]
+        for t, kind, which in zip(arrays.doubt_t, arrays.doubt_kind, named, strict=False):
             said = dict.fromkeys(names[r] if r < len(names) else SLIDE_ENDS for r in which)
             word, place, reason = DOUBTS[int(kind)]
             yield DerivativeDoubt(word, float(t), place or f"{' and '.join(said)} changes", reason)

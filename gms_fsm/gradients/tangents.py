@@ -86,7 +86,7 @@ def in_lanes(
     source: str, title: str, active: ActiveNumbers, lanes: int, size: int
 ) -> Mapping[str, Any]:
     """Return the functions of a text with tangents in lanes, their ``"text"``, and ``"plain"``."""
-    text = with_tangents(source, active, OF_LANES, Lanes(lanes, size))
+    text = with_tangents(source, active, OF_LANES, LanePlaces(lanes, size))
     fast, careful = load(title, text, SIGNALS), CarefulText(title, text, SIGNALS)
     plain = {name: fast[name] for name in OF_LANES}
     made = {name: ieee(fast[name], careful[name]) for name in OF_LANES}
@@ -97,7 +97,7 @@ def with_tangents(
     source: str,
     active: ActiveNumbers,
     names: Iterable[str] = FUNCTIONS,
-    lanes: Lanes | None = None,
+    lanes: LanePlaces | None = None,
 ) -> str:
     """Return the text of some functions with tangents, and all constants of the text."""
     body: list[ast.stmt] = []
@@ -111,7 +111,7 @@ def with_tangents(
 
 
 def _function(
-    function: ast.FunctionDef, active: ActiveNumbers, lanes: Lanes | None
+    function: ast.FunctionDef, active: ActiveNumbers, lanes: LanePlaces | None
 ) -> ast.FunctionDef:
     """Return a function with tangents."""
     filled = [arg.arg for arg in function.args.args if arg.arg in VECTORS[1:]]
@@ -125,7 +125,7 @@ def _function(
 
 
 @dataclass(frozen=True)
-class Lanes:
+class LanePlaces:
     """Tangents side by side.
 
     Parameters
@@ -157,7 +157,7 @@ class Lanes:
 class _Lane(ast.NodeTransformer):
     """Writes a tangent as one of the numbers of a lane."""
 
-    def __init__(self, lanes: Lanes, lane: int) -> None:
+    def __init__(self, lanes: LanePlaces, lane: int) -> None:
         self.lanes, self.lane = lanes, lane
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
@@ -222,7 +222,7 @@ class _TangentWriter:
     """Writes the assignments of tangents of one function."""
 
     def __init__(
-        self, active: ActiveNumbers, function: ast.FunctionDef, lanes: Lanes | None
+        self, active: ActiveNumbers, function: ast.FunctionDef, lanes: LanePlaces | None
     ) -> None:
         self.places, self.lanes = active, lanes
         self.active = {"t", *VECTORS}

@@ -159,8 +159,7 @@ def simulate(
         raise ParameterError(
             "it must be a function of the moment reached", place="progress", value=progress
         )
-    asked = not isinstance(sensitivities, list | tuple) or len(sensitivities) > 0
-    if asked:
+    if is_asked(sensitivities):
         refuse_functions(model)  # what they return depends on the numbers, too
     model = controlled(model, end, chosen, t_start=t_start, initial=initial)
     path = None if checkpoint is None else checked_path("checkpoint", checkpoint)
@@ -168,9 +167,7 @@ def simulate(
         raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")
     start = Problem.of(model, on, end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, start.what, start.output).values() if monitors else ()
-    if asked:
-        check_derivable(chosen, until)
-        wanted = directions_of(start.what, start.program, start.y, sensitivities)
+    wanted = asked_for(start, sensitivities, until)
     own = {} if machines is None else own_machines(machines, start)
     stop = None if until is None else Until.of(start, until)
     if stop is not None:
@@ -201,7 +198,7 @@ def simulate(
     if keeper is not None:
         keeper.finish()
     trace = seen.trace()
-    if asked:
+    if wanted is not None:
         trace = replace(trace, derived=derived(start, wanted, len(trace.rows)))
     return watched(trace, watching) if watching else trace
 
@@ -215,6 +212,21 @@ def simulated(start: Problem, until: str | None = None) -> Trace:
         pass
     found = run.recorder.trace()
     return found if stop is None else stop.trace(found)
+
+
+def is_asked(sensitivities: Iterable[str]) -> bool:
+    """Return whether a run is to be differentiated."""
+    return not isinstance(sensitivities, list | tuple) or len(sensitivities) > 0
+
+
+def asked_for(
+    start: Problem, sensitivities: Iterable[str], until: str | None = None
+) -> Directions | None:
+    """Return by what a run is to be differentiated, if it is; refuse what has no derivative."""
+    if not is_asked(sensitivities):
+        return None
+    check_derivable(start.chosen, until)
+    return directions_of(start.what, start.program, start.y, sensitivities)
 
 
 def derived(start: Problem, directions: Directions, rows: int) -> Sensitivities:

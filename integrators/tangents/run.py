@@ -52,13 +52,7 @@ class FollowArguments(NamedTuple):
 
 
 def follow_run(functions: Functions, machines: Machines, b: Buffers, most_steps: int) -> int:
-    """Run until the end, until something has no room, or for about so many steps.
-
-    Returns
-    -------
-    int
-        `integrators.loop.DONE`, or ROWS if there is more to come, or the reason why not.
-    """
+    """Run until the end (DONE), until something has no room or for so many steps (ROWS)."""
     traced: Any = functions.p
     c, now, out, memory = traced.course, b.now, b.out, b.memory
     on, own = Held(functions, now.held, b.sliding), Held(functions, c.held, c.sliding)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Unpack
 
@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.foundation.arguments import later, refusing
+from gms_fsm.gradients.linear import Directions
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.repeated.numbers import RepeatedRuns, problem_with, with_given
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.run.simulate import Run
+from gms_fsm.run.simulate import Run, asked_for, derived
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted, arguments_of, mounted
 from gms_fsm.systems.rigs import Rig
@@ -56,13 +57,14 @@ def prepare(
     t_start: float = 0.0,
     initial: Mapping[str, Any] | None = None,
     settings: Settings | None = None,
+    sensitivities: Iterable[str] = (),
     **options: Unpack[SettingOptions],
 ) -> Prepared:
     """Make a run ready that will be repeated with other numbers; ``prepare(system, t_end)``.
 
     Parameters
     ----------
-    model, rig, t_end, t_start, initial
+    model, rig, t_end, t_start, initial, sensitivities
         As in `simulate`.
     settings : Settings, optional
         How to integrate and what to record; if omitted, ``engine="compiled"``, which needs the
@@ -96,7 +98,7 @@ def prepare(
     on, end = arguments_of("prepare", model, rig, t_end)
     what = mounted(model, on, chosen.held_period)
     start = Problem.on(what, end, chosen, t_start=t_start, initial=initial)
-    return Prepared(start)
+    return Prepared(start, asked_for(start, sensitivities))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,9 +113,12 @@ class Prepared:
     ----------
     start : Problem
         The run with its first numbers.
+    wanted : Directions, optional
+        By what its traces are differentiated.
     """
 
     start: Problem
+    wanted: Directions | None = None
 
     def __repr__(self) -> str:
         return f"<Prepared: {self.start.what.title}, {self.start.t_end:g} s>"
@@ -131,12 +136,15 @@ class Prepared:
         do not exist or violate their rules, and runs that fail, raise what `simulate` raises.
         """
         given = _own({**numbers, **more} if numbers else more)
-        run = self._all.run(given)
+        start, run = self.start, self._all.run(given)
         if run is None:
-            return self._alone(given, self.start.chosen)
+            return self._alone(given, start.chosen, self.wanted)
         contents = run.taken()
         self._all.take_back(run)
-        start = self.start
+        if self.wanted is not None:
+            now = problem_with(start, given)
+            found = now.trace(*contents())
+            return replace(found, derived=derived(now, self.wanted, len(found.rows)))
         made: Trace = later(
             Trace, lambda: problem_with(start, given).trace(*contents()), initial=start.initial
         )
@@ -198,13 +206,18 @@ class Prepared:
         start = self.start
         return Problem.on(what, start.t_end, chosen, t_start=start.t_start, initial=start.initial)
 
-    def _alone(self, given: Mapping[str, Any], chosen: Settings) -> Trace:
+    def _alone(
+        self, given: Mapping[str, Any], chosen: Settings, wanted: Directions | None = None
+    ) -> Trace:
         """Run as `simulate` does, from new: numbers that change the program, and errors."""
         start = self._again(with_given(self.start.what, given), chosen)
         run = CompiledRun(start) if chosen.engine == "compiled" else Run(start)
         while run.advance():
             pass
-        return run.recorder.trace()
+        trace = run.recorder.trace()
+        if wanted is not None and (now := asked_for(start, wanted.names)) is not None:
+            trace = replace(trace, derived=derived(start, now, len(trace.rows)))
+        return trace
 
 
 def _own(given: Mapping[str, Any]) -> Mapping[str, Any]:
