@@ -55,6 +55,7 @@ LIVE = (
     "js/live/sweep.js",
     "js/live/dragging.js",
     "js/live/live.js",
+    "js/live/matters.js",
 )
 ENGINE = "js/live/engine.js"
 LARGE = 200_000  # characters of an engine, which has its records; of such there is only one

@@ -386,3 +386,21 @@ def test_a_sweep_of_another_contact_has_its_quantities(live: Any) -> None:
     place = page.evaluate(f"{pane}.view.run.recipes[views[0].contact.values.v.all]")
     assert place[0] in ("y", "seen")
     assert page.evaluate(f"JSON.parse({pane}.asked)[2]") == "guide"
+
+
+def test_bars_say_how_much_each_number_matters(live: Any) -> None:
+    scenario, page = live_scenario("pulled_mass"), live("pulled_mass")
+    page.evaluate("go(lastAt(frames.t, 0.55 * frames.t[last]))")
+    wait(page, "document.querySelector('#matters').textContent !== ''")
+    t, names = page.evaluate("[frames.t[frame], [...matters.found.keys()]]")
+    found = page.evaluate("[...matters.found.values()].map(({ slope, same }) => [slope, same])")
+    known = numbers_of(scenario.what)
+    given = {**scenario.arguments, "t_eval": [t], "sensitivities": names}
+    trace = simulate(*scenario.loaded.subject[:-1], scenario.t_end, **given)
+    wanted = [known[name].value * trace.sensitivity("F", name)[0] for name in names]
+    assert all(same for _, same in found)
+    most = np.abs(wanted).max()
+    np.testing.assert_allclose([slope for slope, _ in found], wanted, atol=0.02 * most)
+    largest = names[int(np.argmax(np.abs(wanted)))]
+    assert f"most {largest}: " in page.inner_text("#matters")
+    assert page.locator(f"[data-name={largest}] .matter").get_attribute("aria-label") is not None
