@@ -179,8 +179,8 @@ class _TangentRun:
             slopes=floats(relations, wide), moves=outside(self.moves()), scales=outside(scales),
             times=outside(np.array(() if self.wanted is None else self.wanted, float)),
             rows_t=floats(self.rows), table=floats(self.rows, size * wide),
-            firings=floats(64, wide), doubt_t=floats(16), doubt_kind=places(16), doubt_end=places(16),
-            doubt_names=places(16 * (relations + 1)),
+            firings=floats(64, wide), doubt_t=floats(16), doubt_kind=places(16),
+            doubt_end=places(16), doubt_names=places(16 * (relations + 1)),
         )  # fmt: skip
 
     def sliding(self, relations: int) -> Any:
