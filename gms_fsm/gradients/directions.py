@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.gradients.linear import Directions
@@ -35,18 +37,15 @@ def directions_of(
         raise ParameterError("a name stands there twice", place="sensitivities", value=given)
     shared, own = program.plan.names.shared, program.plan.names.own
     start = np.zeros((len(y), len(given)))
-    scales = np.ones(len(given))
     changes: dict[int, np.ndarray] = {}
     rows: dict[int, np.ndarray] = {}
     for c, name in enumerate(given):
         if isinstance(name, str) and name.startswith(INITIAL):
             places = initial_places(program, name, "sensitivities")
             start[places, c] = 1.0
-            scales[c] = max((abs(y[k]) for k in places), default=0.0) or 1.0
             continue
         number = number_of(what, name)
         label = label_in(what, number.whole)
-        scales[c] = abs(number.value) or 1.0
         place = shared.index(label) if label in shared else -1
         read = f"shared[{place}]" in program.source
         if label not in (*shared, *own) or (number.value == 0.0 and place >= 0 and not read):
@@ -63,7 +62,20 @@ def directions_of(
         k = own.index(label)
         table = rows.setdefault(k, np.zeros((len(program.p[1][k]), len(given))))
         table[slice(None) if number.element is None else number.element, c] = 1.0
-    return Directions(given, changes, rows, start, scales)
+    made = Directions(given, changes, rows, start, np.ones(len(given)))
+    return replace(made, scales=scales_of(made, program, y))
+
+
+def scales_of(directions: Directions, program: Program, y: list[float]) -> FloatArray:
+    """Return how large what changes in each direction is; 1 if it is 0."""
+    scales = np.zeros(directions.count)
+    parts = [(directions.y, np.array(y))]
+    parts += [(row[None], np.array([program.p[0][k]])) for k, row in directions.shared.items()]
+    parts += [(rows, np.array(program.p[1][k])) for k, rows in directions.own.items()]
+    for moves, values in parts:
+        scales = np.maximum(scales, np.abs(moves * values[:, None]).max(axis=0, initial=0.0))
+    scales[scales == 0.0] = 1.0
+    return scales
 
 
 def initial_places(program: Program, name: str, place: str) -> list[int]:

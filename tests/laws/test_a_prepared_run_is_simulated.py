@@ -155,3 +155,18 @@ def test_a_motion_without_a_scale_that_is_pushed_by_an_input_has_the_bits() -> N
     heavy = simulate(replace(pushed, numbers={"m": 2.0}), 3.0, engine="ifelse")
     end = prepare(pushed, 3.0, engine=FASTEST).end({"numbers.m": 2.0})
     assert end.y[0] == heavy.body("mass").x[-1]
+
+
+@pytest.mark.parametrize("engine", ["compiled", "ifelse"])
+def test_its_derivatives_are_those_of_simulate(engine: str) -> None:
+    pytest.importorskip("llvmlite")
+    names = ("F_s", "initial.v")
+    numbers = {"mass": 1.1, "F_s": 1.4}
+    wanted, _ = alone("pulled mass", numbers, engine=FASTEST, sensitivities=names)
+    ready = prepare(
+        *run("pulled mass").subject, run("pulled mass").t_end, engine=engine, sensitivities=names
+    )
+    assert wanted is not None
+    for name in names:
+        found = ready(numbers).sensitivity("z", name)
+        np.testing.assert_array_equal(found, wanted.sensitivity("z", name))

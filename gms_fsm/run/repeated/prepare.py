@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.foundation.arguments import later, refusing
+from gms_fsm.gradients.directions import scales_of
 from gms_fsm.gradients.linear import Directions
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
@@ -143,8 +144,9 @@ class Prepared:
         self._all.take_back(run)
         if self.wanted is not None:
             now = problem_with(start, given)
-            found = now.trace(*contents())
-            return replace(found, derived=derived(now, self.wanted, len(found.rows)))
+            scales = scales_of(self.wanted, now.program, now.y)
+            found, by = now.trace(*contents()), replace(self.wanted, scales=scales)
+            return replace(found, derived=derived(now, by, len(found.rows)))
         made: Trace = later(
             Trace, lambda: problem_with(start, given).trace(*contents()), initial=start.initial
         )
