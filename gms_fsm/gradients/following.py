@@ -29,7 +29,7 @@ from integrators.machine_code.records import arrays_of, numbers_in, numbers_of, 
 from integrators.runners.states import begin
 from integrators.steps import Dense, Now, Scratch, coefficients
 from integrators.tangents import switches
-from integrators.tangents.motion import Course, LaneFunctions, Lanes, SlideLanes, Traced
+from integrators.tangents.motion import LaneFunctions, Lanes, SlideLanes, TangentCourse, Traced
 from integrators.tangents.run import FollowArguments, follow_run
 
 METHOD = coefficients(METHODS["dp45"])
@@ -125,11 +125,11 @@ class _TangentRun:
         """Return the arguments, with something in place of arrays of any length."""
         program, (t, y, mode, last), made = self.program, self.start, self.texts
         tangents = self.tangents["plain"] if self.compiled else self.tangents
-        first = "flow" if self.options.located else "flow_live"
         shared, own, tables = compiling.packed(program.p)
         p = (shared.tolist(), own.tolist(), outside(tables)) if self.compiled else program.p
-        names = first, "arm", "margins", "normal", "follow"
-        numbers = Functions(*[made[name] for name in names], p)
+        numbers = Functions(
+            made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p
+        )
         machines = [made[name] for name in ("switch", "act", "tick", "jolts", "observe")]
         b = hybrid.buffers(equations(program), t, y, mode, last, self.options, ROWS_AT_ONCE)
         relations, plan = len(b.relations.watch), b.plan
@@ -153,7 +153,7 @@ class _TangentRun:
         noting = switches.ask, switches.act, switches.tick, switches.jolts, machines[-1]
         return FollowArguments(switches.functions_of(traced), Machines(*noting), b)
 
-    def course(self, relations: int, outside: Callable[[Any], Any]) -> Course:
+    def course(self, relations: int, outside: Callable[[Any], Any]) -> TangentCourse:
         """Return the tangents at the start."""
         program, (t, y, _, last), count = self.program, self.start, self.directions.count
         size, wide, n = len(y), self.wide, program.layout.n
@@ -167,7 +167,7 @@ class _TangentRun:
         def places(length: int) -> Any:
             return outside(np.zeros(length, dtype=np.int64))
 
-        return Course(
+        return TangentCourse(
             t=t, before=t, settled=-np.inf, span=last - t, instant=1, changed=0, moving=0,
             rows=0, fired=0, next_time=0, doubts=0, named=0,
             y=list(y), y_before=list(y), mode=[0] * n, held=[0.0] * program.held,
@@ -239,7 +239,7 @@ class _TangentRun:
         return np.ascontiguousarray(groups.reshape(groups.shape[0], -1))
 
     # ------------------------------------------------------------------ how it is run
-    def in_lists(self) -> _Call:
+    def in_lists(self) -> _TangentCall:
         """Return what goes on in Python."""
         arguments, solver = self.arguments(lambda array: array.tolist()), None
         b = arguments.buffers
@@ -256,9 +256,9 @@ class _TangentRun:
             return event
 
         course = arguments.functions.p.course
-        return _Call(call, course, course)
+        return _TangentCall(call, course, course)
 
-    def in_block(self) -> _Call:
+    def in_block(self) -> _TangentCall:
         """Return what goes on in machine code."""
         ready = self.ready()
         block = ready.block()
@@ -269,7 +269,7 @@ class _TangentRun:
             return ready.engine(block, STEPS_AT_ONCE)
 
         course = contents.functions.p.course
-        return _Call(call, course, course, lambda: ready.take_back(block))
+        return _TangentCall(call, course, course, lambda: ready.take_back(block))
 
     def put(self, contents: Any) -> Any:
         """Put the numbers of this run into a block."""
@@ -285,8 +285,8 @@ class _TangentRun:
         begin(b, t, y, mode, last, options.floor or options.atol)
         b.out.rows_t, b.out.rows_y = np.zeros(ROWS_AT_ONCE), np.zeros((ROWS_AT_ONCE, len(y)))
         course = self.course(len(traced.course.watch), lambda array: array)
-        put_numbers(traced.course, counts := numbers_of(Course), numbers_in(course, counts))
-        for name in arrays_of(Course):
+        put_numbers(traced.course, counts := numbers_of(TangentCourse), numbers_in(course, counts))
+        for name in arrays_of(TangentCourse):
             value = getattr(course, name)
             if isinstance(value, np.ndarray):
                 setattr(traced.course, name, value)
@@ -303,7 +303,7 @@ class _TangentRun:
 
         program, text = self.program, self.tangents["text"]
         lengths = len(program.p[0]), *map(len, program.p[1])
-        key = program.source, text, lengths, self.options.method, self.options.located
+        key = program.source, text, lengths, self.options.method
         if key not in _KEPT:
             if len(_KEPT) >= compiling.MOST_ENGINES:
                 _KEPT.clear()
@@ -318,7 +318,7 @@ class _TangentRun:
         found: compiling.ReadyCode = _KEPT[key]
         return found
 
-    def to_its_end(self, call: _Call) -> Followed:
+    def to_its_end(self, call: _TangentCall) -> Followed:
         """Go on to the end, and return what has been kept."""
         c = call.course
         while (event := call.on()) != DONE:
@@ -367,7 +367,7 @@ DOUBTS = {
 
 
 @dataclass(eq=False)
-class _Call:
+class _TangentCall:
     """What goes on with a run."""
 
     on: Callable[[], int]

@@ -71,7 +71,7 @@ class Lanes(NamedTuple):
 
 
 @dataclass(slots=True, eq=False)
-class Course:
+class TangentCourse:
     """Where the tangents of a run are, and what has been kept of them."""
 
     t: float  # the time that they are at
@@ -129,7 +129,7 @@ class Traced(NamedTuple):
     every: list[int]  # whether all rows are kept
     locks: list[int]  # whether locks determine components
     wide: list[int]  # number of directions
-    course: Course
+    course: TangentCourse
     lanes: Lanes
 
 

@@ -22,7 +22,14 @@ from integrators.steps import (
     weighted_sum,
 )
 from integrators.switching.machines import Machines
-from integrators.tangents.motion import Course, Lanes, Traced, put_group, rate_in_lanes, take_group
+from integrators.tangents.motion import (
+    Lanes,
+    TangentCourse,
+    Traced,
+    put_group,
+    rate_in_lanes,
+    take_group,
+)
 from integrators.tangents.switches import (
     NO_SLOPE,
     arm_here,
@@ -116,7 +123,7 @@ def _hold(own: Held, b: Buffers, y: Vector) -> None:
 
 def _cross(own: Held, b: Buffers) -> None:
     """Go to the moving instant at which comparisons have changed."""
-    c: Course = own.functions.p.course
+    c: TangentCourse = own.functions.p.course
     c.changed = 0
     for r in range(len(c.watch)):
         c.watch[r] = 0
@@ -131,7 +138,7 @@ def _cross(own: Held, b: Buffers) -> None:
 
 def _begin(own: Held, b: Buffers) -> None:
     """Begin an arc."""
-    c: Course = own.functions.p.course
+    c: TangentCourse = own.functions.p.course
     slide_as(c.sliding, b.sliding)
     for k in range(len(c.held)):
         c.held[k] = b.now.held[k]

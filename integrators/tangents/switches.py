@@ -14,7 +14,7 @@ from integrators.sliding import Functions, Held, Sliding, arm_on, flow_on, margi
 from integrators.step_size import INFINITY
 from integrators.steps import Vector
 from integrators.tangents.motion import (
-    Course,
+    TangentCourse,
     Traced,
     margins_in_lanes,
     put_group,
@@ -131,7 +131,7 @@ def slide_as(own: Sliding, sliding: Sliding) -> None:
 
 def arm_here(on: Held, mode: list[int]) -> None:
     """Hold the signs that an arc starting here would hold."""
-    c: Course = on.functions.p.course
+    c: TangentCourse = on.functions.p.course
     for r in range(len(c.armed)):
         c.armed[r] = 0
     arm_on(on, c.t, c.y, mode, c.armed)
@@ -139,7 +139,7 @@ def arm_here(on: Held, mode: list[int]) -> None:
 
 def rate_of_instant(on: Held, mode: list[int]) -> None:
     """Fill dy/dt at this instant; 0 if it does not move."""
-    c: Course = on.functions.p.course
+    c: TangentCourse = on.functions.p.course
     if c.moving:
         flow_on(c.t, c.y, mode, c.held, on, c.f)
     else:
@@ -352,7 +352,7 @@ def _check(on: Held) -> None:
         doubt(c, TIE, c.t, -1)
 
 
-def doubt(c: Course, kind: int, t: float, only: int) -> None:
+def doubt(c: TangentCourse, kind: int, t: float, only: int) -> None:
     """Note a doubt about some comparisons, or only one."""
     for r in range(len(c.watch)):
         if c.watch[r] > 0 and (only < 0 or only == r):
