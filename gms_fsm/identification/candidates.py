@@ -24,18 +24,7 @@ from gms_fsm.records.record import Record
 from gms_fsm.systems.models import GMS, ChartModel, Model
 from gms_fsm.systems.system import System
 
-__all__ = [
-    "BEHIND_BACKLASH",
-    "CANDIDATES",
-    "STIFFER_ONE_WAY",
-    "Build",
-    "Candidate",
-    "FitStart",
-    "behind_backlash",
-    "gms",
-    "play_bank",
-    "stiffer_one_way",
-]
+__all__ = ["BEHIND_BACKLASH", "CANDIDATES", "STIFFER_ONE_WAY", "Build", "Candidate", "FitStart"]
 
 FINEST = 1e-3  # smallest threshold and gap, as a share of the travel
 # C as multiples of the median speed: slip settles within a threshold of travel, or at once.
@@ -191,19 +180,7 @@ class _Seen:
 def gms(records: Sequence[Record], smoothing: float | None, *, n: int) -> FitStart:
     """Return a bank of GMS elements, signed law, with one C and a bounded Stribeck curve.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        With forces.
-    smoothing : float or None
-        Of the motion, s.
-    n : int
-        Number of elements.
-
-    Returns
-    -------
-    Start
-        From `initial_bank`. F_c is held: only its products with the weights can be told.
+    F_c is held: only its products with the weights can be told.
     """
     seen = _Seen.in_records(records, smoothing)
     bank = initial_bank(records, n, smoothing=smoothing)
@@ -228,18 +205,7 @@ def gms(records: Sequence[Record], smoothing: float | None, *, n: int) -> FitSta
 
 
 def stiffer_one_way(records: Sequence[Record], smoothing: float | None, *, n: int) -> FitStart:
-    """Return a Maxwell-slip bank whose springs are stiffer in one direction.
-
-    Parameters
-    ----------
-    records, smoothing, n
-        As in `gms`.
-
-    Returns
-    -------
-    Start
-        From `initial_bank`, equal in both directions.
-    """
+    """Return a Maxwell-slip bank whose springs may be stiffer in one direction."""
     seen = _Seen.in_records(records, smoothing)
     bank = initial_bank(records, n, smoothing=smoothing)
     values = {
@@ -255,18 +221,7 @@ def stiffer_one_way(records: Sequence[Record], smoothing: float | None, *, n: in
 
 
 def behind_backlash(records: Sequence[Record], smoothing: float | None, *, n: int) -> FitStart:
-    """Return slipping springs behind gaps, with thresholds that differ by direction.
-
-    Parameters
-    ----------
-    records, smoothing, n
-        As in `gms`.
-
-    Returns
-    -------
-    Start
-        From `initial_bank`: a tenth of each threshold becomes half a gap.
-    """
+    """Return slipping springs behind gaps, at first a tenth of each threshold to either side."""
     seen = _Seen.in_records(records, smoothing)
     bank = initial_bank(records, n, smoothing=smoothing)
     r = bank.weights * bank.stribeck.F_c
@@ -293,18 +248,7 @@ def behind_backlash(records: Sequence[Record], smoothing: float | None, *, n: in
 
 
 def play_bank(records: Sequence[Record], smoothing: float | None) -> FitStart:
-    """Return a bank of slipping springs with play, each flank of its own; nothing is searched.
-
-    Parameters
-    ----------
-    records, smoothing
-        As in `gms`.
-
-    Returns
-    -------
-    Start
-        The terms that least squares on a grid of thresholds and gaps needs.
-    """
+    """Return the terms that least squares on a grid of thresholds and gaps needs."""
     bank = solved_bank(records, smoothing)
     model = ChartModel(SPRING_WITH_PLAY, bank.values, n=len(bank.z_c), sigma_2=bank.sigma_2)
     return FitStart(model, bank.used)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from gms_fsm.identification.candidates import Candidate, FitStart
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import ChartModel, LuGre
 
-__all__ = ["JOINTS", "bouc_wen", "dahl", "joint_candidates", "joint_chart", "lugre"]
+__all__ = ["JOINTS", "joint_chart"]
 
 T_0 = 293.15  # K, at which the viscous friction is b
 DIP = "exp(-abs(v / v_s)**alpha)"
@@ -214,35 +215,13 @@ def _started(form: _Form, records: Sequence[Record], smoothing: float | None) ->
 
 
 def dahl(records: Sequence[Record], smoothing: float | None) -> FitStart:
-    """Return Dahl's model.
-
-    Parameters
-    ----------
-    records, smoothing
-        As in `gms_fsm.identification.candidates.gms`.
-
-    Returns
-    -------
-    FitStart
-        From the spring that fits best.
-    """
+    """Return Dahl's model, from the spring that fits best."""
     k, F_c, _ = _numbers(records, smoothing)
     return FitStart(ChartModel(DAHL, {"sigma_0": k, "F_c": F_c}), ("sigma_0", "F_c"))
 
 
 def lugre(records: Sequence[Record], smoothing: float | None) -> FitStart:
-    """Return the LuGre model.
-
-    Parameters
-    ----------
-    records, smoothing
-        As in `gms_fsm.identification.candidates.gms`.
-
-    Returns
-    -------
-    FitStart
-        From the spring that fits best.
-    """
+    """Return the LuGre model, from the spring that fits best."""
     k, F_c, middle = _numbers(records, smoothing)
     curve = Stribeck(F_c, 1.05 * F_c, 0.5 * middle)
     return FitStart(
@@ -253,18 +232,7 @@ def lugre(records: Sequence[Record], smoothing: float | None) -> FitStart:
 
 
 def bouc_wen(records: Sequence[Record], smoothing: float | None) -> FitStart:
-    """Return the Bouc-Wen model.
-
-    Parameters
-    ----------
-    records, smoothing
-        As in `gms_fsm.identification.candidates.gms`.
-
-    Returns
-    -------
-    FitStart
-        From the spring that fits best.
-    """
+    """Return the Bouc-Wen model, from the spring that fits best."""
     k, F_c, _ = _numbers(records, smoothing)
     values = {"k": k, "alpha": 0.01, "D": F_c / k, "A": 1.0, "beta": 0.5, "gamma": 0.5, "p": 2.0}
     return FitStart(
@@ -274,15 +242,8 @@ def bouc_wen(records: Sequence[Record], smoothing: float | None) -> FitStart:
     )
 
 
-def _candidate(form: _Form) -> Candidate:
-    def build(records: Sequence[Record], smoothing: float | None) -> FitStart:
-        return _started(form, records, smoothing)
-
-    return Candidate(form.name, form.reason, build, form.inputs)
-
-
 JOINTS: tuple[Candidate, ...] = (
-    *map(_candidate, FORMS),
+    *(Candidate(form.name, form.reason, partial(_started, form), form.inputs) for form in FORMS),
     Candidate("Dahl", "one bristle, Coulomb friction", dahl),
     Candidate("LuGre", "one bristle, a Stribeck curve", lugre),
     Candidate("Bouc-Wen", "hysteresis with a shape of its own", bouc_wen),
@@ -290,17 +251,6 @@ JOINTS: tuple[Candidate, ...] = (
 
 
 def joint_candidates(records: Sequence[Record]) -> tuple[Candidate, ...]:
-    """Return the candidates whose inputs all of the records give.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        The records.
-
-    Returns
-    -------
-    tuple of Candidate
-        Those of `JOINTS` that can be tried.
-    """
+    """Return the candidates whose inputs all of the records give."""
     given: set[Any] = set.intersection(*({*each.inputs} for each in records))
     return tuple(each for each in JOINTS if {*each.inputs} <= given)
