@@ -132,7 +132,8 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
     else:
         velocity = smooth if tau else raw
         steps = np.diff(time) * 0.5 * (velocity[1:] + velocity[:-1])
-        position = np.concatenate([[0.0], np.cumsum(steps)])
+        origin = record.columns["position"][:1] if "position" in record.columns else [0.0]
+        position = np.concatenate([origin, origin + np.cumsum(steps)])
         notes = [
             "velocity: as measured"
             + (f", smoothed with a time constant of {tau:.4g} s" if tau else "")
@@ -145,6 +146,16 @@ def motion_of(record: Record, smoothing: float | None = None) -> Motion:
             advice="look for outliers, and exclude their rows with where = ...",
         )
     return Motion(time, velocity, position, tau, _standstill(velocity), tuple(notes))
+
+
+def usual_speed(velocity: FloatArray) -> float:
+    """Return the median speed in motion.
+
+    >>> usual_speed(np.array([0.0, 0.0, -2.0, 0.0, 3.0, 2.0, 0.0]))
+    2.0
+    """
+    speed = np.abs(velocity)
+    return float(np.median(speed[speed > 0.1 * np.quantile(speed, 0.99)]))
 
 
 def pieces(time: FloatArray) -> list[slice]:

@@ -121,15 +121,40 @@ def test_records_count_alike_if_asked_and_where_lengths_differ_much() -> None:
     assert weighed[0] == pytest.approx(weighed[1])
 
 
-def test_a_play_bank_is_found_without_a_search() -> None:
-    x = 3e-2 * np.sin(2.0 * np.pi * T / 3.0)
-    z = stop_operators(np.concatenate([x, x]), [6e-3])[-x.size :, 0]
+def with_play(x: np.ndarray, begun: float, where: float = 0.0) -> Record:
+    """Return the record of a spring with 3 mm of play, from a deflection.
+
+    It slips at 6 mm, and then unevenly, as no model has it.
+    """
+    z = stop_operators(np.append(x[0] - begun, x), [6e-3])[1:, 0]
     force = 1e4 * np.maximum(0.0, z - 3e-3) + 2e4 * np.minimum(0.0, z + 3e-3)
-    record = Record.from_arrays(time=T, position=x, force=force + 0.1 * np.sin(40.0 * T))
+    force += np.where(np.abs(z) < 6e-3, 0.1 * np.sin(40.0 * T), 8.0 * np.sin(0.6 * T))
+    return Record.from_arrays(time=T, position=x + where, force=force)
+
+
+def played() -> Fit:
+    record = with_play(3e-2 * np.sin(2.0 * np.pi * T / 3.0), 0.0)
     bank = play_bank([record], None)
-    model = ChartModel(SPRING_WITH_PLAY, bank.values, n=len(bank.z_c))
-    assert fitted(record, model, bank.used).training["r2"] > 0.999
     assert len(bank.used) <= 4
+    return fitted(record, ChartModel(SPRING_WITH_PLAY, bank.values, n=len(bank.z_c)), bank.used)
+
+
+def test_a_play_bank_is_found_without_a_search() -> None:
+    assert played().training["r2"] > 0.95
+
+
+@pytest.mark.parametrize("where", [0.0, 0.04])
+def test_a_state_is_estimated_in_strokes_that_begin_off_the_middle_of_the_play(
+    where: float,
+) -> None:
+    found = played()
+    for side in (1.0, -1.0):
+        stroke = side * 5e-4 * (1.0 - np.cos(2.0 * np.pi * T / 3.0))
+        touching = with_play(stroke, side * 2.7e-3, where)
+        default = found.score(touching)["rmse"]
+        assert found.score(touching, "estimate")["rmse"] < 0.3 * default
+        free = with_play(8.0 * stroke, -side * 2.7e-3, where)  # nothing is touched
+        assert found.score(free, "estimate")["rmse"] < 1.1 * found.score(free)["rmse"]
 
 
 @pytest.mark.every(6)

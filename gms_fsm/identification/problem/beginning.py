@@ -1,8 +1,9 @@
 """The state in which a record begins, where nothing that is known leads to it.
 
-The first stretch of the force tells it as far as it can. What it cannot tell, such as a deflection
-in the middle of a play, is as in training: a state that the elements had there together, rather
-where the motion was nearly the same.
+The first stretch of the force tells it as far as it can, against the errors that the model has
+where about the same force was measured: in the midst of a play they are small. What it cannot tell
+is as by default, or as in training: a state that the elements had there together, rather where the
+motion was nearly the same.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ STRAY = 0.5  # of half the range of a variable: how far it may be from the state
 SEEDS, STEPS = 3, 8  # the best of the guesses, which are refined, and how often
 STEP, LENGTHS = 1e-3, (1.0, 0.5, 0.2, 0.05)  # of differences, of half the range; parts of a step
 MOST_ROWS = 400
+LEVELS = 20  # of what is measured, each with a noise of its own
 ROUNDS = 2  # of states and parameters in turn
 
 State = Mapping[str, FloatArray]
@@ -80,15 +82,16 @@ def _begun(task: Task, point: Point, course: Course) -> _Starts | None:
     seen, near, widths = list[FloatArray](), list[FloatArray](), dict[str, int]()
     fastest = max(float(np.abs(each.v).max()) for each in coarse.courses) or 1.0
     travel = max(float(np.ptp(each.x)) for each in coarse.courses) or 1.0
-    for each in coarse.courses:
+    for each in (course, *coarse.courses):
         trace = coarse.driver.run(subject, each)
         layout = trace.program.layout
         names = [bank.of(variable) for bank in layout.banks for variable in bank.variables]
         widths = {layout.label(name): len(layout.y.all_of(name)) for name in names}
         parts = [trace.rows.y[:, layout.y.where(name)].reshape(len(each.t), -1) for name in names]
-        seen.append(np.hstack([np.empty((len(each.t), 0)), *parts]))
         apart = np.hypot((each.x - course.x[0]) / travel, (each.v - course.v[0]) / fastest)
-        near.append(apart)
+        taken = slice(1 if each is course else None)  # of the course itself its default state
+        seen.append(np.hstack([np.empty((len(each.t), 0)), *parts])[taken])
+        near.append(apart[taken])
     if not widths:
         return None
     states, apart = np.concatenate(seen), np.concatenate(near)
@@ -99,6 +102,19 @@ def _begun(task: Task, point: Point, course: Course) -> _Starts | None:
     terms = point.linear[len(fine.solved) :]
     there = states[order], apart[order]
     return _Starts(fine, subject, course, terms, start, runs, widths, *there)
+
+
+def _noise(task: Task, point: Point, measured: FloatArray) -> FloatArray:
+    """Return the mean square of residuals in training where about the same was measured."""
+    fine = task.fine
+    values, squares = fine.unweighted(fine.target), fine.unweighted(point.residual) ** 2
+    order = np.argsort(values, kind="stable")
+    several = max(1, values.size // LEVELS)
+    edges = np.arange(0, values.size, several)
+    counts = np.diff(np.append(edges, values.size))
+    level = np.add.reduceat(values[order], edges) / counts
+    found: FloatArray = np.interp(measured, level, np.add.reduceat(squares[order], edges) / counts)
+    return found
 
 
 def estimated(
@@ -120,8 +136,9 @@ def estimated(
         return {}
     seen, experiment = starts.seen, starts.experiment
     half = np.maximum(0.5 * np.ptp(seen, axis=0), 1e-300)
-    noise = max(point.cost / max(point.residual.size, 1), (1e-6 * experiment.typical) ** 2)
-    count = max(float(short.rows.sum()) / tau, 1.0)
+    between = float(np.median(np.diff(task.courses[0].t)))  # the rows that tau counts
+    count = max(float(short.t[-1] - short.t[0]) / (between * tau), 1.0)
+    noise = np.maximum(_noise(task, point, short.measured), (1e-6 * experiment.typical) ** 2)
     share = np.sqrt(count / short.rows.sum() / noise)
 
     def errors(states: FloatArray) -> FloatArray:
