@@ -15,6 +15,7 @@ from gms_fsm.foundation.files import csv_text, output_folder, refuse_input, writ
 from gms_fsm.foundation.quantities import in_words
 from gms_fsm.foundation.text import plain, table_lines
 from gms_fsm.identification.certainty.profile import LIMIT, Profile
+from gms_fsm.identification.reach import measures
 from gms_fsm.identification.result import Choice, Estimate, Fit, Residuals
 
 __all__ = ["report_files", "report_folder", "write_report"]
@@ -273,15 +274,15 @@ def _scores(fit: Fit, residuals: Sequence[Residuals]) -> list[str]:
 def _reach(fit: Fit) -> list[str]:
     """Return what was met in training; what lies outside of it is not known."""
     met = fit.reach
-    unit = fit.task.measured.unit
     shares = {
         state: [each.shares[state] for each in met] for each in met[:1] for state in each.shares
     }
     told = [f"{state} {min(own):.0%} to {max(own):.0%}" for state, own in shares.items()]
     return [
-        f"- amplitude: up to {in_words(max(each.amplitude for each in met), 'm', 3)}",
-        f"- speed at changes of state: up to {in_words(max(each.speed for each in met), 'm/s', 3)}",
-        f"- force at rest: up to {in_words(max(each.rest for each in met), unit, 3)}",
+        *(
+            f"- {what}: up to {in_words(max(getattr(each, name) for each in met), unit, 3)}"
+            for name, (what, unit) in measures(fit.task.measured).items()
+        ),
         f"- share of time by state: {plain(', '.join(told)) or 'one state'}",
         "- what a motion does beyond, `found.outside(record)` says, and a prediction warns of it",
     ]

@@ -15,18 +15,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
-from gms_fsm.charts.gms import Law, check_law
-from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, RecordError
-from gms_fsm.foundation.arguments import checked_integer, checked_kind, listed, refusing
-from gms_fsm.records.motion import Motion
+from gms_fsm.foundation.arguments import checked_integer, refusing
+from gms_fsm.identification.problem.arguments import checked_records, column_of, window_of
+from gms_fsm.records.motion import Motion, usual_speed
 from gms_fsm.records.record import Record
 from gms_fsm.systems.gms_parameters import GMSParameters
 from gms_fsm.systems.models import GMS
@@ -54,12 +54,10 @@ def initial_bank(
     records: Record | Sequence[Record],
     n: int,
     *,
-    law: Law = "signed",
     train: tuple[float, float] | None = None,
     smoothing: float | None = None,
-    v_c: float | None = None,
 ) -> GMS:
-    """Return a bank of GMS elements to start a fit from.
+    """Return a bank of GMS elements, signed law, to start a fit from.
 
     Stiffnesses and thresholds r_i come from the records: non-negative least squares on stop
     operators with 60 thresholds and a force offset, neighbours merged to n elements (total
@@ -69,8 +67,9 @@ def initial_bank(
     The rest is chosen, not measured, and only a start for a fit: F_c is the plateau force
     ``sum(k_i r_i)``; F_s = 1.05 F_c; v_s is half the median speed in motion, so that the curve is
     flat again at that speed; ``C_i = alpha_i C / k_i`` with C = sum(k_i) times the median speed, so
-    that the bank follows the curve within about the time it takes to move over a threshold; damping
-    and viscous friction are zero.
+    that the bank follows the curve within about the time it takes to move over a threshold; v_c is
+    what the quietest standstill of the records can resolve, at most a tenth of the median speed, or
+    without a standstill a thousandth of it; damping and viscous friction are zero.
 
     Parameters
     ----------
@@ -78,16 +77,11 @@ def initial_bank(
         With a force; all of one device, with one offset.
     n : int
         Number of elements, 1 to 60.
-    law : {"signed", "published"}
-        The slip law of the model; the stop operators are those of ``"signed"``.
     train : tuple of float, optional
         Rows with ``train[0] <= time < train[1]`` are used, s; by default all. The motion before
         them is followed; no other force is read.
     smoothing : float, optional
         As in `gms_fsm.records.motion.motion_of`, s.
-    v_c : float, optional
-        Arrest velocity, m/s; by default what the quietest standstill of the records can resolve, at
-        most a tenth of the median speed, or without a standstill a thousandth of it.
 
     Returns
     -------
@@ -97,7 +91,7 @@ def initial_bank(
     Raises
     ------
     ParameterError
-        If n, law, train or v_c is not as described.
+        If n or train is not as described.
     RecordError
         If there is no force, motion or force do not change, fewer than 20 training rows are left
         after the motion has first covered 90 % of its travel, or the force does not oppose the
@@ -115,7 +109,6 @@ def initial_bank(
     >>> (model.stribeck.F_c * model.weights).round(9).tolist()
     [0.0001, 0.0003]
     """
-    check_law(law)
     count = checked_integer("n", n, 1)
     if count > MOST_ELEMENTS:
         raise ParameterError(
@@ -124,11 +117,11 @@ def initial_bank(
             value=n,
             advice="a record hardly tells more than 8 elements apart",
         )
-    arrest = None if v_c is None else checked_scalar("v_c", v_c, "> 0")
-    data = _training(_checked_records(records), _interval(train), smoothing)
+    rows = window_of("train", train) or (-np.inf, np.inf)
+    data = _training(checked_records(records), rows, smoothing)
     grid = data.fitted(thresholds(data.travel))
     bank = _split(_refined(data, _merged(grid, count)), count)
-    return _model(bank, data, law, arrest)
+    return _model(bank, data)
 
 
 def stop_operators(x: ArrayLike, r: ArrayLike) -> FloatArray:
@@ -262,43 +255,19 @@ class _Bank(NamedTuple):
         return float(self.residual @ self.residual)
 
 
-def _checked_records(records: Any) -> list[Record]:
-    wanted = "a Record, for example Record.from_csv(path), or several"
-    given = [records] if isinstance(records, Record) else listed("records", records, wanted)
-    if not given:
-        raise ParameterError(f"it must be {wanted}", place="records", value=records)
-    return [checked_kind(f"records[{i}]", each, Record, "a Record") for i, each in enumerate(given)]
-
-
-def _interval(train: Any) -> tuple[float, float]:
-    if train is None:
-        return -np.inf, np.inf
-    start, end = checked_array("train", train, 2, "finite").tolist()
-    if not start < end:
-        raise ParameterError(
-            "its end must be after its start", place="train", value=train, advice="give (t0, t1), s"
-        )
-    return start, end
-
-
 def _training(
     records: list[Record], train: tuple[float, float], smoothing: float | None
 ) -> _Training:
-    for record in records:
-        if "force" not in record.columns:
-            raise RecordError(
-                "there is no force to fit", place=record.place, advice="give force=(name, unit)"
-            )
     place = ", ".join(record.place for record in records)
     most = max(USED_ROWS // len(records), LEAST_ROWS)
     motions = [record.motion(smoothing) for record in records]
-    parts, forces, speeds = list[_Part](), list[FloatArray](), list[FloatArray]()
+    parts, forces, moved = list[_Part](), list[FloatArray](), list[FloatArray]()
     for record, motion in zip(records, motions, strict=True):
         part, rows = _part(record, motion, train, most)
         parts.append(part)
-        forces.append(record.columns["force"][rows])
-        speeds.append(np.abs(motion.velocity[motion.time < train[1]]))
-    force, speed = np.concatenate(forces), np.concatenate(speeds)
+        forces.append(column_of(record, "force")[rows])
+        moved.append(motion.velocity[motion.time < train[1]])
+    force = np.concatenate(forces)
     travel = max((float(np.ptp(part.position)) for part in parts if part.position.size), default=0)
     if force.size < FEWEST_ROWS:
         raise RecordError(
@@ -315,8 +284,7 @@ def _training(
                 place=place,
                 advice="check the columns, and train",
             )
-    moving = speed[speed > 0.1 * np.quantile(speed, 0.99)]
-    median = float(np.median(moving))
+    median = usual_speed(np.concatenate(moved))
     resolved = [v_c for motion in motions if (v_c := motion.fitting_v_c()) > 0.0]
     v_c = min([*resolved, FASTEST_ARREST * median]) if resolved else ARREST * median
     return _Training(tuple(parts), force, travel, median, v_c, place)
@@ -410,9 +378,7 @@ def _split(bank: _Bank, n: int) -> tuple[FloatArray, FloatArray]:
     return r[order], k[order]
 
 
-def _model(
-    bank: tuple[FloatArray, FloatArray], data: _Training, law: Law, v_c: float | None
-) -> GMS:
+def _model(bank: tuple[FloatArray, FloatArray], data: _Training) -> GMS:
     r, k = bank
     F_c = float(k @ r)
     return GMS(
@@ -421,7 +387,7 @@ def _model(
             k,
             C=float(k.sum()) * data.speed,
             stribeck=Stribeck(F_c, STICTION * F_c, DIP * data.speed),
-            v_c=v_c or data.v_c,
+            v_c=data.v_c,
         ),
-        law=law,
+        law="signed",
     )

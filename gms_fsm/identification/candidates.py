@@ -20,6 +20,7 @@ from gms_fsm.charts.zoo.bristles.maxwell_slip import MAXWELL_SLIP
 from gms_fsm.identification.bank import initial_bank
 from gms_fsm.identification.play_bank import SPRING_WITH_PLAY
 from gms_fsm.identification.play_bank import play_bank as solved_bank
+from gms_fsm.records.motion import usual_speed
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import GMS, ChartModel, Model
 from gms_fsm.systems.system import System
@@ -160,11 +161,9 @@ class _Seen:
     @classmethod
     def in_records(cls, records: Sequence[Record], smoothing: float | None) -> _Seen:
         motions = [record.motion(smoothing) for record in records]
-        speed = np.concatenate([np.abs(motion.velocity) for motion in motions])
-        fastest = float(np.quantile(speed, 0.99))
-        moving = speed[speed > 0.1 * fastest]
+        velocity = np.concatenate([motion.velocity for motion in motions])
         travel = max(float(np.ptp(motion.position)) for motion in motions)
-        return cls(travel, float(np.median(moving)), fastest)
+        return cls(travel, usual_speed(velocity), float(np.quantile(np.abs(velocity), 0.99)))
 
     @property
     def slip(self) -> tuple[float, float]:

@@ -22,9 +22,10 @@ from gms_fsm.foundation.arguments import checked_kind, listed, refusing
 from gms_fsm.identification.candidates import CANDIDATES, Candidate, FitStart
 from gms_fsm.identification.certainty.assess import AT_BOUND, Estimate
 from gms_fsm.identification.certainty.statistics import correlation_time
-from gms_fsm.identification.fit import checked_records, fitted, options_of, task_of, window_of
+from gms_fsm.identification.fit import fitted, options_of, task_of
 from gms_fsm.identification.folds import Folds, Parts, folds_of
 from gms_fsm.identification.joints import joint_candidates
+from gms_fsm.identification.problem.arguments import checked_records, column_of, window_of
 from gms_fsm.identification.problem.experiment import Point, value_of
 from gms_fsm.identification.problem.runs import ThreadPool
 from gms_fsm.identification.problem.search import Best, refine
@@ -123,7 +124,9 @@ def choose(
     >>> found.choice.chosen
     '1 springs'
     """
-    every = _checked_records(records)
+    every = checked_records(records)
+    for each in every:
+        column_of(each, "force")
     common = options_of(
         free=("k",),  # each candidate has its own
         train=window_of("train", train),
@@ -132,10 +135,6 @@ def choose(
         smoothing=smoothing,
         seed=seed,
         most_steps=most_steps,
-        search="hops",
-        begin=None,
-        nuisance=("offset",),
-        bounds={},
         weight=weight,
     )
     tried = _checked_candidates(candidates, every)
@@ -178,18 +177,6 @@ def choose(
 
 
 # --------------------------------------------------------------------------- arguments
-def _checked_records(records: Any) -> list[Record]:
-    given = checked_records(records)
-    for each in given:
-        if "force" not in each.columns:
-            raise RecordError(
-                "it has no force, with which to compare",
-                place=each.place,
-                advice="give force=(name, unit) when reading it",
-            )
-    return given
-
-
 def _checked_candidates(given: Any, records: Sequence[Record]) -> list[Candidate]:
     """Return candidates; those of the user start from their own model."""
     if given is None:  # loads and temperatures tell of a joint

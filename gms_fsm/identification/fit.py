@@ -34,6 +34,7 @@ from gms_fsm.identification.certainty.assess import (
     unassessed,
 )
 from gms_fsm.identification.certainty.statistics import correlation_time
+from gms_fsm.identification.problem.arguments import checked_records, column_of, window_of
 from gms_fsm.identification.problem.beginning import ROUNDS, with_states
 from gms_fsm.identification.problem.experiment import MASS, NUISANCE, Point, value_of
 from gms_fsm.identification.problem.linear import linear_names
@@ -52,11 +53,11 @@ from gms_fsm.identification.problem.unknowns import values_by_key
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.mounted import Mounted, misplaced, mounted_alone
+from gms_fsm.systems.mounted import Mounted, mounted_alone
 from gms_fsm.systems.numbers import known_in, varied
 from gms_fsm.systems.system import System
 
-__all__ = ["fit", "fitted", "options_of", "task_of", "window_of"]
+__all__ = ["fit", "fitted", "options_of", "task_of"]
 
 STOPPED = "The search was interrupted: this is the best so far."
 STOPPED_LATE = "Interrupted before the intervals were known: this is the best so far."
@@ -198,27 +199,31 @@ def fit(
 # --------------------------------------------------------------------------- arguments
 def options_of(**given: Any) -> FitOptions:
     """Check the arguments that do not depend on model and records."""
-    checked_integer("seed", given["seed"], 0)
-    if given["most_steps"] is not None:
-        checked_integer("most_steps", given["most_steps"], 1)
-    for name in ("cycles", "smoothing"):
+    for name, rule in (("cycles", "> 0"), ("smoothing", ">= 0")):
         if given[name] is not None:
-            given[name] = checked_scalar(name, given[name], "> 0" if name == "cycles" else ">= 0")
-    one_of("search", given["search"], SEARCHES)
-    if given["begin"] is not None:
-        one_of("begin", given["begin"], BEGINS)
-    if given.get("weight") is not None:
-        one_of("weight", given["weight"], WEIGHTS)
-    for name in given["nuisance"]:
+            given[name] = checked_scalar(name, given[name], rule)
+    options = FitOptions(**given)
+    checked_integer("seed", options.seed, 0)
+    if options.most_steps is not None:
+        checked_integer("most_steps", options.most_steps, 1)
+    one_of("search", options.search, SEARCHES)
+    for name, value, known in (
+        ("begin", options.begin, BEGINS),
+        ("weight", options.weight, WEIGHTS),
+    ):
+        if value is not None:
+            one_of(name, value, known)
+    for name in options.nuisance:
         one_of("nuisance", name, tuple(NUISANCE))
-        if given["nuisance"].count(name) > 1:
+        if options.nuisance.count(name) > 1:
             raise ParameterError(f"{name!r} is given twice", place="nuisance")
-    checked_kind("bounds", given["bounds"], Mapping, "a mapping, for example {'C': (1e-5, 1e-2)}")
-    if not given["free"]:
+    wanted = "a mapping, for example {'C': (1e-5, 1e-2)}"
+    checked_kind("bounds", options.bounds, Mapping, wanted)
+    if not options.free:
         raise ParameterError(
             "nothing is to be found", place="free", advice="name parameters, for example ['k']"
         )
-    return FitOptions(**given)
+    return options
 
 
 def _names(name: str, given: Any) -> tuple[str, ...]:
@@ -227,44 +232,6 @@ def _names(name: str, given: Any) -> tuple[str, ...]:
     for each in names:
         checked_kind(name, each, str, "names of parameters, for example ['k', 'weights']")
     return tuple(names)
-
-
-def window_of(name: str, given: Any) -> tuple[float, float] | None:
-    """Return a span of time."""
-    if given is None:
-        return None
-    try:
-        first, last = given
-    except (TypeError, ValueError):
-        raise ParameterError(
-            "it must be two times (from, to), s", place=name, value=given
-        ) from None
-    first = checked_scalar(f"{name}: from", first, "finite")
-    last = checked_scalar(f"{name}: to", last, "finite")
-    if not first < last:
-        raise ParameterError(
-            f"it ends at {last:g} s, not after its start at {first:g} s", place=name
-        )
-    return first, last
-
-
-def checked_records(given: Any) -> list[Record]:
-    """Return one record or several as a list."""
-    wanted = "a Record, for example Record.from_csv(path), or several"
-    if not isinstance(given, Record) and (advice := misplaced(given)):
-        raise ParameterError(f"it must be {wanted}", place="records", value=given, advice=advice)
-    every = [given] if isinstance(given, Record) else listed("records", given, wanted)
-    if not every:
-        raise ParameterError(f"it must be {wanted}", place="records", value=given)
-    for i, each in enumerate(every):
-        if not isinstance(each, Record):
-            raise ParameterError(
-                "it must be a Record, from Record.from_csv or from_dataframe",
-                place=f"records[{i}]",
-                value=each,
-                advice=misplaced(each),
-            )
-    return every
 
 
 def task_of(
@@ -309,13 +276,7 @@ def _check_records(task: Task) -> None:
     """Refuse records from which nothing can be found."""
     column = task.measured.column
     for record in task.records:
-        if column not in record.columns:
-            raise RecordError(
-                f"it has no {column}, with which to compare",
-                place=record.place,
-                advice=f"give {column} = {{ column = ..., unit = ... }} in a scenario, "
-                f"{column}=(name, unit) in Python; it has {', '.join(record.columns)}",
-            )
+        column_of(record, column)
     _check_loads(task)
     train, test = task.options.train, task.options.test
     if train is not None and test is not None and train[0] < test[1] and test[0] < train[1]:

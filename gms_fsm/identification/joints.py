@@ -28,6 +28,7 @@ from gms_fsm.charts.zoo.bristles.bouc_wen import BOUC_WEN
 from gms_fsm.charts.zoo.bristles.dahl import DAHL
 from gms_fsm.identification.bank import initial_bank
 from gms_fsm.identification.candidates import Candidate, FitStart
+from gms_fsm.records.motion import usual_speed
 from gms_fsm.records.record import Record
 from gms_fsm.systems.models import ChartModel, LuGre
 
@@ -176,8 +177,7 @@ FORMS = (
 def _numbers(records: Sequence[Record], smoothing: float | None) -> tuple[float, float, float]:
     """Return stiffness and plateau force of one spring, and the median speed in motion."""
     bank = initial_bank(records, 1, smoothing=smoothing)
-    speed = np.concatenate([np.abs(each.motion(smoothing).velocity) for each in records])
-    middle = float(np.median(speed[speed > 0.1 * np.quantile(speed, 0.99)]))
+    middle = usual_speed(np.concatenate([each.motion(smoothing).velocity for each in records]))
     return float(bank.parameters.k[0]), bank.stribeck.F_c, middle
 
 

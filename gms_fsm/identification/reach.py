@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.arguments import checked_kind
-from gms_fsm.foundation.quantities import in_words
+from gms_fsm.foundation.quantities import in_words, per_second
 from gms_fsm.identification.certainty.statistics import correlation_time
 from gms_fsm.identification.problem.beginning import estimated
 from gms_fsm.identification.problem.experiment import Experiment
-from gms_fsm.identification.problem.runs import AT_REST, Course
+from gms_fsm.identification.problem.runs import AT_REST, ComparedColumn, Course
 from gms_fsm.identification.problem.task import at_all_rows, stretches
 from gms_fsm.records.record import Record
 from gms_fsm.systems.mounted import Mounted
@@ -71,16 +71,22 @@ def reach_of(experiment: Experiment, subject: Mounted, course: Course) -> Reach:
     )
 
 
-def outside(own: Reach, training: Sequence[Reach], unit: str) -> Iterator[str]:
+def measures(compared: ComparedColumn) -> dict[str, tuple[str, str]]:
+    """Return what a reach measures, by the names of its fields: words and units."""
+    return {
+        "amplitude": ("amplitude", compared.length),
+        "speed": ("speed at changes of state", per_second(compared.length)),
+        "rest": ("force at rest", compared.unit),
+    }
+
+
+def outside(own: Reach, training: Sequence[Reach], compared: ComparedColumn) -> Iterator[str]:
     """Yield what of a motion lies outside of the training, in words."""
-    for name, what, of in (
-        ("amplitude", "the amplitude", "m"),
-        ("speed", "the speed at which elements change their state", "m/s"),
-        ("rest", "the force at rest", unit),
-    ):
+    for name, (what, of) in measures(compared).items():
         here, most = getattr(own, name), max(getattr(each, name) for each in training)
         if here > SLACK * most:
-            yield f"{what} is {in_words(here, of, 3)}, in training at most {in_words(most, of, 3)}"
+            told = f"the {what} is {in_words(here, of, 3)}"
+            yield f"{told}, in training at most {in_words(most, of, 3)}"
     for state, share in own.shares.items():
         known: FloatArray = np.array([each.shares.get(state, 0.0) for each in training])
         if share > known.max() + SHARE or share < known.min() - SHARE:

@@ -38,6 +38,7 @@ from gms_fsm.identification.certainty.compared import (
 from gms_fsm.identification.certainty.intervals import Bootstrap, bootstrapped, profiled
 from gms_fsm.identification.certainty.profile import Profile
 from gms_fsm.identification.certainty.residuals import Residuals, floor_of, residuals_of
+from gms_fsm.identification.problem.arguments import column_of
 from gms_fsm.identification.problem.experiment import Point
 from gms_fsm.identification.problem.runs import BEGINS, MOVING
 from gms_fsm.identification.problem.task import Task
@@ -274,8 +275,8 @@ class Fit:
             With a position or a velocity, and the inputs that the model reads. Its force is not
             read but for ``initial="estimate"``.
         initial : {"estimate"} or mapping, optional
-            The state at the first row: found from the force of the first seconds, with the range of
-            states in training as a prior; or given as in `gms_fsm.simulate`. By default that of the
+            The state at the first row: found from the force of the first seconds, near the default
+            or a state of the training; or given as in `gms_fsm.simulate`. By default that of the
             fit: relaxed, or after a run-in.
         lead : float
             From how many seconds a state is estimated.
@@ -319,10 +320,10 @@ class Fit:
             state; empty if all of them were met in training.
         """
         checked_kind("record", record, Record, "a Record, from Record.from_csv or from_dataframe")
-        unit, found = self.task.measured.unit, dict[str, None]()
+        found = dict[str, None]()
         for course in self.task.along(record, None):
             own = reach_of(self.task.fine, self.task.subject, course)
-            found |= dict.fromkeys(outside(own, self.reach, unit))
+            found |= dict.fromkeys(outside(own, self.reach, self.task.measured))
         return tuple(found)
 
     @cached_property
@@ -357,13 +358,7 @@ class Fit:
             If it has no force.
         """
         checked_kind("record", record, Record, "a Record, from Record.from_csv or from_dataframe")
-        column = self.task.measured.column
-        if column not in record.columns:
-            raise RecordError(
-                f"it has no {column}, with which to compare",
-                place=record.place,
-                advice=f"give {column}=(name, unit) when reading it",
-            )
+        measured = column_of(record, self.task.measured.column)
         modelled = self.predict(record, initial, lead)
         chosen = record.chosen & np.isfinite(modelled)
         if initial == "estimate":
@@ -375,7 +370,7 @@ class Fit:
                     place=record.place,
                     advice="give a shorter lead",
                 )
-        return score_of(record.columns[column][chosen], modelled[chosen])
+        return score_of(measured[chosen], modelled[chosen])
 
     # ------------------------------------------------------------------ how sure it is
     def profile(self, name: str, *, restarts: bool = True, seed: int = 0) -> Profile:

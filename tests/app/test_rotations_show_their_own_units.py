@@ -203,6 +203,8 @@ def test_a_fit_of_a_joint_has_units_of_rotations(tmp_path: Path) -> None:
         "offset": "Nm",
     }
     assert only_of_rotations(str(found))
+    wide = Record.from_arrays(time=t, velocity=3.0 * np.sin(2 * np.pi * t))
+    assert only_of_rotations("\n".join(found.outside(wide)))
 
 
 # --------------------------------------------------------------------------- what turns

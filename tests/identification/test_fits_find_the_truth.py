@@ -158,8 +158,9 @@ def test_a_choice_does_not_see_the_motion_after_the_training() -> None:
 
 
 @pytest.mark.matrix
-def test_a_record_that_begins_in_motion_runs_in() -> None:
-    late = rubbed(12.0).between(9.3, 24.0)  # in the middle of a stroke, all elements deflected
+@pytest.mark.parametrize("begin", [9.3, 6.495])  # in the middle of a stroke, and where it turns
+def test_a_record_that_begins_in_motion_runs_in(begin: float) -> None:
+    late = rubbed(12.0).between(begin, 24.0)  # all elements deflected
     found = fitted(late)
     assert found.begin == "run in"
     assert found["k1"].value == pytest.approx(2e4, rel=0.01)
