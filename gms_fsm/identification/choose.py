@@ -437,9 +437,9 @@ def _final(best: _Tried, records: Sequence[Record], options: FitOptions) -> Fit:
 def simplest(fit: Fit) -> Fit:
     """Return a fit without terms that cannot be told or stand at a bound.
 
-    One after the other is left out, that which is missed least first, and the rest fitted anew; a
-    fit is kept while its error rises by less than 1 %. What the force is linear in becomes 0, any
-    other number keeps its value and is no longer found.
+    One after the other is left out, that which is missed least first, and the rest fitted anew, as
+    long as the error rises by less than 1 %; what is left is then judged again. What the force is
+    linear in becomes 0, any other number keeps its value and is no longer found.
 
     Parameters
     ----------
@@ -470,42 +470,53 @@ def simplest(fit: Fit) -> Fit:
     """
     checked_kind("fit", fit, Fit, "a Fit, from gms_fsm.fit")
     gone = list[str]()
-    while True:
-        weak = [each for each in fit.table if not each.told or each.note == AT_BOUND]
-        tries = list[tuple[float, str, Task]]()
-        for each in weak:
-            try:
-                task, what = _without(fit, each)
-                point = task.fine.start_point()
-            except GMSError:  # nothing would be left
-                continue
-            if point.lost is None:
-                tries.append((point.cost, what, task))
-        most = fit.point.cost * (1.0 + RISE) ** 2
-        for cost, what, task in sorted(tries, key=lambda each: each[0]):
-            if cost > most and not task.fine.searched:
-                continue  # nothing else would move
-            options = replace(task.options, search="local")
-            try:
-                smaller = fitted(replace(task, options=options))
-            except GMSError:
-                continue
-            if smaller.point.cost <= most:
-                gone.append(what)
+    with ThreadPool() as pool:
+        while weak := [each for each in fit.table if not each.told or each.note == AT_BOUND]:
+            task, without = _lighter(fit, weak, pool)
+            if not without:
                 break
-        else:
-            if gone:
-                told = f"left out, as the records cannot tell them: {', '.join(gone)}"
-                fit = replace(fit, notes=(*fit.notes, told))
-            return fit
-        fit = replace(smaller, choice=fit.choice)
+            smaller = fitted(replace(task, options=replace(task.options, search="local")))
+            if smaller.point.cost > _most(fit.point):
+                break
+            fit, gone = replace(smaller, choice=fit.choice), [*gone, *without]
+    if not gone:
+        return fit
+    told = f"left out, as the records cannot tell them: {', '.join(gone)}"
+    return replace(fit, notes=(*fit.notes, told))
 
 
-def _without(fit: Fit, each: Estimate) -> tuple[Task, str]:
+def _most(point: Point) -> float:
+    """Return the cost up to which a smaller model is as good."""
+    return point.cost * (1.0 + RISE) ** 2
+
+
+def _lighter(fit: Fit, weak: Sequence[Estimate], pool: ThreadPool) -> tuple[Task, list[str]]:
+    """Return the task without as many weak terms as may go on few rows, and which went."""
+    task, gone = fit.task, list[str]()
+    most = _most(task.coarse.start_point())
+    tries = list[tuple[float, int]]()
+    for i, each in enumerate(weak):
+        try:
+            tries.append((_without(task, each)[0].coarse.start_point().cost, i))
+        except GMSError:  # nothing would be left
+            continue
+    for _, i in sorted(tries):
+        try:
+            other, what = _without(task, weak[i])
+        except GMSError:
+            continue
+        start = other.coarse.coordinates.start
+        point = refine(other.coarse, start, STEP, EVALUATIONS, pool)
+        if point.lost is None and point.cost <= most:
+            task = replace(other, subject=other.coarse.fitted(point))
+            gone.append(what)
+    return task, gone
+
+
+def _without(task: Task, each: Estimate) -> tuple[Task, str]:
     """Return the task without a term, and what became of it."""
-    task = fit.task
-    if each.name in fit.nuisance:
-        kept = tuple(name for name in fit.nuisance if name != each.name)
+    if each.name in task.options.nuisance:
+        kept = tuple(name for name in task.options.nuisance if name != each.name)
         return replace(task, options=replace(task.options, nuisance=kept)), each.name
     unknown = next(one for one in task.unknowns if one.name == each.name)
     linear = any(one.name == each.name for one in task.fine.solved)

@@ -226,8 +226,12 @@ class Experiment:
         ]
 
     def at(self, u: FloatArray) -> Point:
-        """Evaluate one proposal."""
-        return self.many([u])[0]
+        """Evaluate one proposal; where nothing is searched there is only one."""
+        return self.many([u])[0] if self.searched else self._only
+
+    @cached_property
+    def _only(self) -> Point:
+        return self.many([np.empty(0)])[0]
 
     def _point(self, u: FloatArray, found: Modelled) -> Point:
         try:
