@@ -19,6 +19,7 @@ from gms_fsm.charts.parameters import FloatArray, Parameter
 from gms_fsm.charts.zoo.bristles.maxwell_slip import MAXWELL_SLIP
 from gms_fsm.errors import RecordError
 from gms_fsm.identification.bank import stop_operators
+from gms_fsm.records.motion import Motion, usual_speed
 from gms_fsm.records.record import Record
 
 __all__ = ["SPRING_WITH_PLAY", "PlayBank", "play_bank"]
@@ -30,6 +31,9 @@ GAPS = np.array([0, 0.2, 0.5, 1, 2, 3, 4, 5, 6, 8, 10]) / 60
 SPEEDS = (1.0, 2.0, 4.0)  # v_s as multiples of the median speed in motion
 RISE = 0.02  # of the sum of squares, for which terms may be taken away altogether: 1 % of the error
 TERMS = ("k_f", "k_b", "d_f", "d_b")
+# Shares of half the travel. A spring that hardly ever slips, and friction without a gap in the
+# midst of gaps, predict most where least was measured: they are used only if the rest does not do.
+FURTHEST, SHORTEST = 0.99, 0.1
 
 SPRING_WITH_PLAY = Chart(
     name="Slipping spring with play, each flank of its own",
@@ -92,36 +96,28 @@ class PlayBank:
         return (*found, "sigma_2") if self.sigma_2 > 0.0 else tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """The motion of one record in few rows, its force, and what each of its rows counts."""
-
-    x: FloatArray
-    v: FloatArray
-    force: FloatArray
-    rows: NDArray[np.bool_]
-    weight: float
-
-
 def play_bank(records: Sequence[Record], smoothing: float | None) -> PlayBank:
     """Return the bank that fits the force best, with as few terms as do nearly as well."""
-    parts = [_part(record, smoothing, max(ROWS // len(records), FEWEST_ROWS)) for record in records]
-    travel = max(float(np.ptp(part.x)) for part in parts)
-    speed = np.concatenate([np.abs(part.v) for part in parts])
-    fastest = float(np.quantile(speed, 0.99))
-    if travel == 0.0 or fastest == 0.0:
+    parts = [(record, record.motion(smoothing)) for record in records]
+    most = max(ROWS // len(records), FEWEST_ROWS)
+    travel = max(float(np.ptp(motion.position)) for _, motion in parts)
+    v = np.concatenate([m.velocity[:: max(1, len(m.time) // most)] for _, m in parts])
+    if travel == 0.0 or np.quantile(np.abs(v), 0.99) == 0.0:
         raise RecordError("the motion does not change", place=records[0].place, advice="move it")
-    middle = float(np.median(speed[speed > 0.1 * fastest]))
+    middle = usual_speed(v)
     pairs = np.array([(s, g) for s in THRESHOLDS for g in GAPS if g < s]) * 0.5 * travel
-    best: tuple[float, float, FloatArray, FloatArray] | None = None
+    solved = list[tuple[float, float, FloatArray]]()
     for v_s in (share * middle for share in SPEEDS):
-        gram = np.sum([_gram(part, pairs, v_s) for part in parts], axis=0)
-        shares, squares = _solved(gram, np.arange(gram.shape[0] - 1))
-        if best is None or squares < best[0]:
-            best = squares, v_s, gram, shares
-    assert best is not None
-    squares, v_s, gram, shares = best
-    kept = _fewest(gram, np.flatnonzero(shares), squares * (1.0 + RISE))
+        gram = np.sum([_gram(*part, most, pairs, v_s) for part in parts], axis=0)
+        solved.append((_solved(gram, np.arange(gram.shape[0] - 1))[1], v_s, gram))
+    squares, v_s, gram = min(solved, key=lambda each: each[0])
+    limit = squares * (1.0 + RISE)
+    z_c, g = pairs.T
+    near = (z_c < FURTHEST * z_c.max()) & ((g > 0.0) | (z_c > SHORTEST * z_c.max()))
+    kept = np.flatnonzero(np.append(np.tile(near, len(TERMS)), np.ones(3, dtype=bool)))
+    if _solved(gram, kept)[1] > limit:
+        kept = np.arange(gram.shape[0] - 1)
+    kept = _fewest(gram, kept, limit)
     shares, _ = _solved(gram, kept)
     stiffness = shares[: 4 * len(pairs)].reshape(4, -1).T
     own = stiffness.any(axis=1)
@@ -134,27 +130,21 @@ def play_bank(records: Sequence[Record], smoothing: float | None) -> PlayBank:
     return PlayBank(pairs[own, 0], pairs[own, 1], stiffness[own], v_s, float(shares[-3]))
 
 
-def _part(record: Record, smoothing: float | None, most: int) -> Stretch:
-    motion, every = record.motion(smoothing), slice(None, None, max(1, len(record) // most))
-    chosen = record.chosen[every]
-    force = np.where(chosen, record.columns["force"][every], 0.0)
-    weight = float(record.chosen.sum() / max(int(chosen.sum()), 1))
-    return Stretch(motion.position[every], motion.velocity[every], force, chosen, weight)
-
-
-def _gram(part: Stretch, pairs: FloatArray, v_s: float) -> FloatArray:
-    """Return the inner products of all terms and the force over the rows of a record.
+def _gram(record: Record, motion: Motion, most: int, pairs: FloatArray, v_s: float) -> FloatArray:
+    """Return the inner products of all terms and the force over about so many rows of a record.
 
     The motion is passed twice: what was before is not known, and forgotten the second time.
     """
+    every = slice(None, None, max(1, len(record) // most))
+    rows, x, v = record.chosen[every], motion.position[every], motion.velocity[every]
+    force = np.where(rows, record.columns["force"][every], 0.0)
     thresholds, which = np.unique(pairs[:, 0], return_inverse=True)
-    z = stop_operators(np.concatenate([part.x, part.x]), thresholds)[-part.x.size :, which]
+    z = stop_operators(np.concatenate([x, x]), thresholds)[-x.size :, which]
     forward, backward = np.maximum(0.0, z - pairs[:, 1]), np.minimum(0.0, z + pairs[:, 1])
-    dip = np.exp(-((part.v / v_s) ** 2))[:, None]
-    one = np.ones((part.x.size, 1))
-    others = [part.v[:, None], one, -one, part.force[:, None]]
-    columns = np.hstack([forward, backward, forward * dip, backward * dip, *others])[part.rows]
-    found: FloatArray = part.weight * (columns.T @ columns)
+    dip, one = np.exp(-((v / v_s) ** 2))[:, None], np.ones((x.size, 1))
+    others = [v[:, None], one, -one, force[:, None]]
+    columns = np.hstack([forward, backward, forward * dip, backward * dip, *others])[rows]
+    found: FloatArray = record.chosen.sum() / max(int(rows.sum()), 1) * (columns.T @ columns)
     return found
 
 
