@@ -211,7 +211,11 @@ COLUMN_UNITS = {
     quantity: UNITS[quantity] | UNITS.get(_ROTATIONS.get(quantity, ""), {})
     for quantity in ("time", *_ROTATIONS)
 }
-_SPELLED = {"µ": "u", "μ": "u", "°": "deg", "N·m": "Nm", "N m": "Nm", "N*m": "Nm", "1/min": "rpm"}
+_SPELLED = {
+    **{"µ": "u", "μ": "u", "°": "deg", "deg C": "degC", "sec": "s", " s^-1": "/s"},
+    **dict.fromkeys(("N·m", "N m", "N*m"), "Nm"),
+    **dict.fromkeys(("1/min", "min^-1", "U/min"), "rpm"),
+}
 
 
 def of_rotation(unit: str) -> str:

@@ -155,17 +155,22 @@ def _unit_of_name(quantity: str, name: str) -> str:
     other = next(
         (each for each, units in COLUMN_UNITS.items() if unit in units and len(unit) > 1), ""
     )
-    if unit in known or other or (clear and unit):
-        raise ParameterError(
-            f"its values would be read in {_si(quantity)}"
-            + (f", and {unit} measures {other}" if other and unit not in known else ""),
-            place=quantity,
-            value=name,
-            advice=f"give the column of {other}: {other}=({name!r}, {unit!r})"
-            if other and unit not in known
-            else f"give the unit, too: ({name!r}, {unit if unit in known else _si(quantity)!r})",
-        )
-    return _si(quantity)
+    if unit in known:
+        reason, advice = "", f"give the unit, too: ({name!r}, {unit!r})"
+    elif other:
+        reason = f", and {unit} measures {other}"
+        advice = f"give the column of {other}: {other}=({name!r}, {unit!r})"
+    elif clear and unit:
+        reason = f", and {unit} is not known"
+        advice = f"convert it, or give the unit, too, one of {', '.join(known)}"
+    else:
+        return _si(quantity)
+    raise ParameterError(
+        f"its values would be read in {_si(quantity)}{reason}",
+        place=quantity,
+        value=name,
+        advice=advice,
+    )
 
 
 def _named_unit(name: str) -> tuple[str, bool]:

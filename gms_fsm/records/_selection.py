@@ -25,10 +25,10 @@ from gms_fsm.records.motion import GAP
 FEWEST = 5  # rows of a record
 MISSING = ("error", "drop", "interpolate")
 DUPLICATES = ("error", "mean")
-# What instruments write where they have no number, in lower case.
+# What instruments and spreadsheets write where they have no number: its letters, in lower case.
 GAP_WORDS = frozenset(
-    ["nan", "na", "n/a", "#n/a", "null", "none", "nil", "-", "--", "---", "?", "missing"]
-    + ["ovr", "ovl", "ovld", "ol", "over", "overflow", "overrange", "out-of-range", "invalid"]
+    ["nan", "na", "nv", "div", "null", "none", "nil", "missing", "qnan", "snan", "ind", "inf"]
+    + ["ovr", "ovl", "ovld", "ol", "over", "overflow", "overrange", "outofrange", "invalid"]
 )
 Rows: TypeAlias = NDArray[np.int64]
 Chosen: TypeAlias = NDArray[np.bool_]
@@ -330,7 +330,8 @@ def _check_words(origin: Origin, part: RecordRows, words: Words, missing: str) -
 
 def is_gap(text: str) -> bool:
     """Return whether a cell says that there is no number."""
-    return not text.strip() or text.strip().strip("[]()<>*").lower() in GAP_WORDS
+    letters = re.sub(r"[\W\d_]", "", text).lower()
+    return letters in GAP_WORDS or not (letters or any(each.isdigit() for each in text))
 
 
 def _check_separator(origin: Origin, words: Words) -> None:

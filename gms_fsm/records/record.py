@@ -263,6 +263,8 @@ class Record:
             The row of the column names, the first line of the file being 1; by default the first
             row that has those of all quantities. Rows above it are not read. A line of units below
             it is compared with the units given.
+        columns : sequence of str, optional
+            The names of the columns of a table without a header.
         encoding : str, optional
             By default UTF-8, or UTF-16 if the file says so by a byte order mark.
         name : str, optional

@@ -118,11 +118,18 @@ READ: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "OVR in the force": (lines(T, X, HOLE), {"missing": "drop"}),
     "dashes in the force": (lines(T, X, [*F[:3], "---", *F[4:]]), {"missing": "interpolate"}),
+    "stars in the force": (lines(T, X, [*F[:3], "*****", *F[4:]]), {"missing": "drop"}),
+    "a spreadsheet's error in the force": (
+        lines(T, X, [*F[:3], "#DIV/0!", *F[4:]]),
+        {"missing": "drop"},
+    ),
+    "seconds in words": (lines(T, X, F, head="t (sec),x,F"), {"time": "t (sec)"}),
     "milliseconds": (lines(T * 1e3, X, F, head="t [ms],x,F"), {"time": "t [ms]"}),
 }
 REFUSED: dict[str, tuple[str, dict[str, Any], str]] = {
     "unit at the end alone": (lines(T, MM, F, head="t,x_mm,F"), {"position": "x_mm"}, "('x_mm', 'mm')"),
     "unit against the name": (lines(T, MM, F, head="t,x [mm],F"), {"position": ("x [mm]", "m")}, "'mm'"),
+    "turns": (lines(T, MM, F, head="t,q [rev],F"), {"position": "q [rev]"}, "rev is not known"),
     "counts": (lines(T, MM, F, head="t,x [counts],F"), {"position": "x [counts]"}, "give the unit, too"),
     "velocity as position": (lines(T, MM, F, head="t,v [mm/s],F"), {"position": "v [mm/s]"}, "velocity=('v [mm/s]', 'mm/s')"),
     "velocity as position, plainly": (lines(T, MM, F, head="t,v_mm_s,F"), {"position": "v_mm_s"}, "velocity=("),

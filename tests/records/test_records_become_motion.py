@@ -9,7 +9,6 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from gms_fsm import Record
-from gms_fsm.errors import RecordError
 from gms_fsm.foundation.quantities import COLUMN_UNITS, convert_numbers, factor
 from gms_fsm.records.motion import Motion, motion_of
 from gms_fsm.records.record import Column
@@ -125,29 +124,6 @@ def test_where_chooses_rows(where: str, kept: range, tmp_path: Path) -> None:
         assert where in said
     else:
         assert record.notes == ()
-
-
-def test_bad_rows_can_be_left_out_at_the_ends_only_for_the_motion(tmp_path: Path) -> None:
-    position, force = 1e-3 * T, FORCE.copy()
-    position[[0, 19]] = np.nan
-    force[0] = np.nan
-    text = table(["t", "x", "F"], T, position, force)
-    columns = {"position": SI["position"], "force": SI["force"]}
-    with pytest.raises(RecordError, match=r"rows 2, 21, column 'x'"):
-        read(tmp_path, text, **columns)
-    assert len(read(tmp_path, text, "1 s <= time <= 18 s", **columns)) == 18
-
-
-def test_force_may_be_missing_between_selected_rows(tmp_path: Path) -> None:
-    force = FORCE.copy()
-    force[10] = np.nan
-    text = table(["t", "x", "F"], T, T, force)
-    columns = {"position": SI["position"], "force": SI["force"]}
-    with pytest.raises(RecordError, match="row 12, column 'F'"):
-        read(tmp_path, text, **columns)
-    record = read(tmp_path, text, "time < 9.5 s or time > 10.5 s", **columns)
-    assert record.chosen.sum() == 19
-    assert len(record) == 20
 
 
 def test_gaps_are_noted_with_row_numbers(tmp_path: Path) -> None:
