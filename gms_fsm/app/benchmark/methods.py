@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares, nnls
+from scipy.optimize import nnls
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.identification.bank import stop_operators, thresholds
-from gms_fsm.identification.candidates import FitStart, gms
+from gms_fsm.identification.candidates import Build, FitStart, gms
 from gms_fsm.identification.choose import choose
 from gms_fsm.identification.fit import fitted, task_of
-from gms_fsm.identification.joints import bouc_wen, dahl, lugre
+from gms_fsm.identification.joints import JOINTS
 from gms_fsm.identification.problem.task import FitOptions
 from gms_fsm.identification.result import Fit
 from gms_fsm.records.parts import thinned
@@ -45,31 +45,6 @@ class Method:
     on: tuple[str, ...] = ("tribometer",)  # names of data sets
 
 
-# --------------------------------------------------------------------------- without memory
-def _static(records: Sequence[Record], smoothing: float | None, _: Predictor | None) -> Predictor:
-    """Fit a Stribeck curve, smoothed at zero velocity, with viscous friction and an offset."""
-    v = np.concatenate([each.motion(smoothing).velocity[each.chosen] for each in records])
-    force = np.concatenate([each.columns["force"][each.chosen] for each in records])
-    fastest, size = float(np.abs(v).max()), float(np.std(force))
-
-    def curve(velocity: FloatArray, p: FloatArray) -> FloatArray:
-        v_s, v_t = fastest * np.exp(p[3:5])
-        stribeck = p[0] + p[1] * np.exp(-((velocity / v_s) ** 2))
-        found: FloatArray = stribeck * np.tanh(velocity / v_t) + p[2] * velocity / fastest + p[5]
-        return found
-
-    start = np.array([size, 0.1 * size, 0.0, -1.0, -3.0, float(force.mean())])
-
-    def left(p: FloatArray) -> FloatArray:
-        found: FloatArray = curve(v, p) - force
-        return found
-
-    # A curve that is flat at all speeds, or steps at zero: trials that the search leaves again.
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        best = least_squares(left, start).x
-    return Predictor(6, lambda record: curve(record.motion(smoothing).velocity, best))
-
-
 # --------------------------------------------------------------------------- Maxwell-slip
 def _maxwell(n: int) -> Train:
     """Stop operators on a grid of thresholds, viscous friction and offset, by NNLS."""
@@ -96,11 +71,11 @@ def _maxwell(n: int) -> Train:
 
 
 # --------------------------------------------------------------------------- fits
-def _gms(n: int) -> Callable[[Sequence[Record], float | None], FitStart]:
+def _gms(n: int) -> Build:
     return lambda records, smoothing: gms(records, smoothing, n=n)
 
 
-def _fitted(build: Callable[[Sequence[Record], float | None], FitStart]) -> Train:
+def _fitted(build: Build) -> Train:
     """Fit by hops; later splits are refined from the previous one."""
 
     def train(
@@ -166,11 +141,12 @@ def _few(records: Sequence[Record]) -> list[Record]:
 
 
 BOTH = ("tribometer", "damper")
+_OF_JOINTS = {each.name: _fitted(each.build) for each in JOINTS}
 METHODS = (
-    Method("static curve", _static, BOTH),
-    Method("Dahl", _fitted(dahl)),
-    Method("LuGre", _fitted(lugre)),
-    Method("Bouc-Wen", _fitted(bouc_wen)),
+    Method("static curve", _OF_JOINTS["static"], BOTH),
+    Method("Dahl", _OF_JOINTS["Dahl"]),
+    Method("LuGre", _OF_JOINTS["LuGre"]),
+    Method("Bouc-Wen", _OF_JOINTS["Bouc-Wen"]),
     Method("Maxwell-slip, NNLS, 15", _maxwell(15)),
     Method("Maxwell-slip, NNLS, 24", _maxwell(24), ("damper",)),
     Method("GMS 1", _fitted(_gms(1))),
