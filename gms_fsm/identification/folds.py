@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError, RecordError
@@ -37,28 +38,27 @@ class Folds:
     others: Mapping[str, Parts] = field(default_factory=dict)
 
 
+def _apart(records: tuple[Record, ...], group: NDArray[np.intp]) -> Parts:
+    """Return folds that leave out one group of records at a time."""
+    pairs = list(zip(records, group.tolist(), strict=True))
+    return tuple(
+        (tuple(each for each, own in pairs if own != i), tuple(e for e, own in pairs if own == i))
+        for i in range(int(group.max()) + 1)
+    )
+
+
 def _grouped(records: tuple[Record, ...], by: str) -> Parts:
     """Return folds that leave out all records of about one amplitude, or of about one speed."""
     moved = [record.motion(None) for record in records]
-    size = np.array(
-        [
-            float(np.ptp(each.position) if by == "amplitude" else np.abs(each.velocity).max())
-            for each in moved
-        ]
-    )
-    order = np.argsort(size)
-    new = np.append(False, np.diff(np.log(np.maximum(size[order], 1e-300))) > math.log(APART))
-    group = np.empty(size.size, dtype=int)
+    sizes = [
+        float(np.ptp(each.position) if by == "amplitude" else np.abs(each.velocity).max())
+        for each in moved
+    ]
+    order = np.argsort(sizes)
+    new = np.append(False, np.diff(np.log(np.maximum(sizes, 1e-300))[order]) > math.log(APART))
+    group = np.empty(order.size, dtype=int)
     group[order] = np.cumsum(new)
-    if group.max() == 0:
-        return ()
-    return tuple(
-        (
-            tuple(record for record, own in zip(records, group, strict=True) if own != i),
-            tuple(record for record, own in zip(records, group, strict=True) if own == i),
-        )
-        for i in range(int(group.max()) + 1)
-    )
+    return _apart(records, group) if group.any() else ()
 
 
 def folds_of(records: Sequence[Record], fold: Any, options: FitOptions) -> Folds:
@@ -75,9 +75,8 @@ def folds_of(records: Sequence[Record], fold: Any, options: FitOptions) -> Folds
                 value=fold,
                 advice="give several, or fold='cycles'",
             )
-        parts = [(every[:i] + every[i + 1 :], (every[i],)) for i in range(len(every))]
         others = {by: found for by in FOLDS[2:] if (found := _grouped(every, by))}
-        return Folds(every, tuple(parts), others)
+        return Folds(every, _apart(every, np.arange(len(every))), others)
     if fold in FOLDS[2:]:
         groups = _grouped(every, fold)
         if not groups:
@@ -90,22 +89,12 @@ def folds_of(records: Sequence[Record], fold: Any, options: FitOptions) -> Folds
         return Folds(every, groups)
     blocks = [_blocks(record, options.cycles) for record in every]
     count = min(int(block.max()) + 1 for block in blocks)
-    return Folds(
-        every,
-        tuple(
-            (
-                tuple(
-                    only(record, block % count != i)
-                    for record, block in zip(every, blocks, strict=True)
-                ),
-                tuple(
-                    only(record, block % count == i)
-                    for record, block in zip(every, blocks, strict=True)
-                ),
-            )
-            for i in range(count)
-        ),
-    )
+
+    def rows(i: int, *, left: bool) -> tuple[Record, ...]:
+        pairs = zip(every, blocks, strict=True)
+        return tuple(only(record, (block % count == i) == left) for record, block in pairs)
+
+    return Folds(every, tuple((rows(i, left=False), rows(i, left=True)) for i in range(count)))
 
 
 def _blocks(record: Record, cycles: float | None) -> Any:

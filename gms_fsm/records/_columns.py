@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from gms_fsm.errors import ParameterError, UnitError, keyed
+from gms_fsm.errors import ParameterError, RecordError, UnitError, keyed
 from gms_fsm.foundation.arguments import checked_kind
 from gms_fsm.foundation.quantities import COLUMN_UNITS, ROTARY, factor, input_factor, plain
 
@@ -70,14 +70,16 @@ class Column:
 ColumnLike: TypeAlias = str | tuple[str, str] | tuple[str, str, int] | Column
 
 
-def columns_of(given: dict[str, Any], inputs: Any = None) -> dict[str, Column]:
+def columns_of(place: str, given: dict[str, Any], inputs: Any = None) -> dict[str, Column]:
     """Return the column of each quantity and each input that has one.
 
     Examples
     --------
-    >>> columns_of({"position": ("x", "mm"), "force": "F [kN]", "normal": None})["force"]
+    >>> columns_of("rig", {"time": "t", "force": "F [kN]", "normal": None})["force"]
     Column(name='F [kN]', unit='kN', sign=1)
     """
+    if given["time"] is None:
+        raise RecordError("no column is given for 'time'", place=place, advice="give time = ...")
     found: dict[str, Column] = {}
     for quantity, each in given.items():
         if each is not None:

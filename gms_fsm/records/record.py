@@ -301,16 +301,12 @@ class Record:
         the header is row 2; the rows above are not read
         row 3 is a line of units: s, mm
         """
-        given = {"time": time, "position": position, "velocity": velocity}
-        found = columns_of(given | {"force": force, "normal": normal}, inputs)
         if hasattr(path, "columns"):
             advice = "Record.from_dataframe(frame, time=..., position=..., force=...) reads it"
             raise ParameterError("it is no file", place="path", value=path, advice=advice)
         file = checked_path("path", path)
-        if "time" not in found:
-            raise RecordError(
-                "no column is given for 'time'", place=str(file), advice="give time = ..."
-            )
+        given = {"time": time, "position": position, "velocity": velocity}
+        found = columns_of(str(file), given | {"force": force, "normal": normal}, inputs)
         form = TextFormat.of(delimiter, decimal, comment, header, encoding, thousands, columns)
         cells = read_cells(file, found, form)
         origin = Origin(str(file), {quantity: each.name for quantity, each in found.items()})
@@ -429,14 +425,10 @@ class Record:
         RecordError
             As in `from_csv`; rows count from 0.
         """
-        given = {"time": time, "position": position, "velocity": velocity}
-        columns = columns_of(given | {"force": force, "normal": normal}, inputs)
         checked_kind("name", name, str, "a text")
         place = f"record {shown(name)}"
-        if "time" not in columns:
-            raise RecordError(
-                "no column is given for 'time'", place=place, advice="give time = ..."
-            )
+        given = {"time": time, "position": position, "velocity": velocity}
+        columns = columns_of(place, given | {"force": force, "normal": normal}, inputs)
         words: Words = {}
         values = {
             quantity: column.in_si(quantity, _frame_column(place, frame, quantity, column, words))
