@@ -73,7 +73,7 @@ def table(rows: Sequence[Row]) -> str:
     '| mine | 3 | 0.05 | 0.0712 | 0.99891 | 2.0 |  |'
     """
     lines = [
-        "| model | free | training RMSE N | held-out RMSE N | held-out R² | s | |",
+        "| model | free | training RMSE N | held-out RMSE N | held-out R² | CPU s | |",
         "|---|--:|--:|--:|--:|--:|---|",
     ]
     lines += [
