@@ -87,7 +87,7 @@ def test_nothing_is_offered_for_varying(model: ChartModel) -> None:
     assert other.values["F_c"] == 0.3
     assert other.weights.tolist() == [1.0, 1.0]
     for name in ("F_s", "v_s", "weights"):
-        with pytest.raises(ParameterError, match=f"'{name}'; .*there are k, F_c, sigma_2$"):
+        with pytest.raises(ParameterError, match=f"'{name}'; .*there are k, F_c, sigma_2, v$"):
             sweep(model, RIG, 3.0, {name: [1.0, 2.0]}, engine="machines")
 
 
