@@ -178,14 +178,9 @@ def slide_in_lanes(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -
                 rest += s.g_t[j * lanes + lane] * s.dy[j] + s.g[j] * dy[size + j * lanes + lane]
             s.right[r * lanes + lane] = -rest
     for lane in range(lanes):
+        put_gains(sliding, size)
         for r in range(count):
-            g, row = sliding.normals[r], sliding.matrix[r]
-            for c in range(count):
-                half, gain = sliding.halves[c], 0.0
-                for j in range(size):
-                    gain += g[j] * half[j]
-                row[c] = gain
-            row[count] = s.right[r * lanes + lane]
+            sliding.matrix[r][count] = s.right[r * lanes + lane]
         solve(sliding.matrix, count, s.solved, INFINITY)
         for c in range(count):
             s.sigma_t[c * lanes + lane] = s.solved[c]
@@ -193,6 +188,17 @@ def slide_in_lanes(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -
                 dy[size + j * lanes + lane] += s.solved[c] * sliding.halves[c][j]
     for j in range(size):
         dy[j] = s.dy[j]
+
+
+def put_gains(sliding: Sliding, size: int) -> None:
+    """Fill the linear system of the surfaces slid on, but for its right side."""
+    for r in range(sliding.count):
+        g, row = sliding.normals[r], sliding.matrix[r]
+        for c in range(sliding.count):
+            half, gain = sliding.halves[c], 0.0
+            for j in range(size):
+                gain += g[j] * half[j]
+            row[c] = gain
 
 
 def margins_in_lanes(

@@ -17,6 +17,7 @@ from integrators.tangents.motion import (
     TangentCourse,
     Traced,
     margins_in_lanes,
+    put_gains,
     put_group,
     slide_in_lanes,
     take_group,
@@ -190,15 +191,10 @@ def _onto(on: Held, mode: list[int]) -> None:
             c.t, w.now.y, mode, p, c.armed, w.margins, w.t, numbers, w.margins_t
         )
         for lane in range(lanes):
+            put_gains(sliding, size)
             for r in range(count):
-                g, row = sliding.normals[r], sliding.matrix[r]
-                for k in range(count):
-                    half, gain = sliding.halves[k], 0.0
-                    for j in range(size):
-                        gain += g[j] * half[j]
-                    row[k] = gain
                 above = sliding.surfaces.above[sliding.which[r]]
-                row[count] = w.margins_t[above * lanes + lane]
+                sliding.matrix[r][count] = w.margins_t[above * lanes + lane]
             solve(sliding.matrix, count, s.solved, INFINITY)
             for k in range(count):
                 back = s.solved[k] if abs(s.solved[k]) < INFINITY else 0.0
