@@ -19,7 +19,7 @@ from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.equality import ByIdentity
 from gms_fsm.foundation.extras import has_machine_code
 from gms_fsm.gradients.linear import Directions
-from gms_fsm.gradients.tangents import in_lanes
+from gms_fsm.gradients.tangents import in_lanes, refuse_callables
 from gms_fsm.language import comparisons, split
 from gms_fsm.lowering import compiling
 from gms_fsm.lowering.program import Program, equations
@@ -93,6 +93,7 @@ def follow(
     rows: int = 4 * ROWS_AT_ONCE,
 ) -> Followed:
     """Differentiate a run of about so many rows."""
+    refuse_callables(program)
     inside = has_machine_code() and isinstance(options.method, Tableau)
     run = _TangentRun(program, options, start, directions, inside, rows)
     return run.to_its_end(run.in_block() if inside else run.in_lists())

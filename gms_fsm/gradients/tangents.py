@@ -63,6 +63,12 @@ def tangents(program: Program, active: ActiveNumbers) -> Mapping[str, Any]:
     >>> dy[0], slope[0]
     (2.0, 2.0)
     """
+    refuse_callables(program)
+    return _made(program.source, program.plan.title, active)
+
+
+def refuse_callables(program: Program) -> None:
+    """Refuse signals that are Python functions."""
     if program.callables:
         name = next(iter(program.callables))
         raise ParameterError(
@@ -71,7 +77,6 @@ def tangents(program: Program, active: ActiveNumbers) -> Mapping[str, Any]:
             advice="give the signal as an expression or as corners",
             key=("sensitivities",),
         )
-    return _made(program.source, program.plan.title, active)
 
 
 @functools.lru_cache(maxsize=64)
