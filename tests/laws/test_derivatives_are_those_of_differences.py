@@ -44,10 +44,12 @@ def test_rows_keep_their_bits(name: str):
     assert np.array_equal(with_them.t, without.t)
 
 
-@pytest.mark.parametrize("name", ["system servo", "sliding", "system impact"])
-def test_they_have_equal_bits_in_all_engines(name: str, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize(("name", "part"), [("system servo", 0.1), ("sliding", 1.0)])
+def test_they_have_equal_bits_in_all_engines(
+    name: str, part: float, monkeypatch: pytest.MonkeyPatch
+):
     pytest.importorskip("llvmlite")
-    run = replace(corpus.run(name), t_end=0.3 * corpus.run(name).t_end)
+    run = replace(corpus.run(name), t_end=part * corpus.run(name).t_end)
     names = names_of(run, 5)  # more than stand in lanes
     compiled = run(engine="compiled", sensitivities=names).derived.followed
     monkeypatch.setattr(following, "has_machine_code", lambda: False)
