@@ -25,7 +25,7 @@ from gms_fsm.lowering.printing.scale_text import HELPERS, scale_text
 from gms_fsm.systems.reading.assembly import CURVE_LOAD, Bank, of
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import LEAST_LOAD
-from integrators.loop import START, Buffers
+from integrators.loop import ASK, JUMPING, START, Buffers
 from integrators.steps import Vector
 
 FUNCTIONS = ("bend", "scale", "enter", "raise_floor")
@@ -309,4 +309,8 @@ def adapt(functions: Any, b: Buffers, seen: Vector, live: Vector, a: Adapting) -
         for j in range(len(a.sizes)):
             if control.atol[j] > 0.0:
                 now.floor[j] = control.atol[j]
+        # Slopes and margins that are kept are those of the old numbers.
+        if b.memory.phase != JUMPING:
+            b.memory.phase = ASK
+            b.memory.fresh = True
     return a.times[0]

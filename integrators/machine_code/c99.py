@@ -60,9 +60,14 @@ __all__ = [
 
 TYPES = {"f": "double", "i": "int64_t", "b": "bool", "p": "char *"}
 HEAD = """\
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+
+#if defined(__FAST_MATH__) || DBL_MANT_DIG != 53
+#error "double must be IEEE binary64, and -ffast-math must not be used"
+#endif
 """
 HELPERS = {
     "min_f": "static inline double min_f(double a, double b) { return b < a ? b : a; }",

@@ -169,6 +169,21 @@ def test_numbers_are_set_and_all_that_follows_from_them(c: Library) -> None:
         assert c.set(state, place, value) == -1
 
 
+def test_a_number_that_is_set_in_the_midst_of_a_motion_counts_from_then_on(c: Library) -> None:
+    """Not only from the second stage of the next step on: rates are asked for anew."""
+    state = c.begun()
+    for _ in range(5):
+        assert c.advance(state, 0.5, 0.5, 1.0) == 0  # in steady slip
+    assert c.set(state, c.place("F_c"), 0.8) == 0
+    z = [state.z[0]]
+    for _ in range(2):
+        assert c.advance(state, 0.5, 0.5, 1e-6) == 0
+        z.append(state.z[0])
+    first, second = np.diff(z)
+    assert first == pytest.approx(second, rel=1e-3)
+    assert first > 1e-8
+
+
 @pytest.mark.matrix
 def test_the_entry_of_the_default_state_follows_a_number(tmp_path: Path) -> None:
     entry = {"z": "2.0 * z_0 + sgn(tau - 2.0)"}

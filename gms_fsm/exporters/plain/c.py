@@ -113,6 +113,8 @@ def limits_of(element: NamedFriction) -> list[str]:
     found = [
         "the velocity is linear in the sample, other inputs are constant",
         "an element switches once in the sample at most, and once more after a change of direction",
+        "guards are looked at where steps end: while an element sticks, |v| * dt is small beside "
+        "the deflection at which it breaks away",
         "dt times the fastest rate at which a variable relaxes is at most 0.1",
     ]
     scale = next((c for c in element.constants if c.about.endswith("Stribeck velocity")), None)

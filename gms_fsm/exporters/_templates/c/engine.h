@@ -57,8 +57,9 @@ int ${name}_advance(${name}_state *s, ${lines}double dt, int64_t max_steps);
 /* The same, to the time t. */
 int ${name}_advance_to(${name}_state *s, ${lines}double t, int64_t max_steps);
 
-/* A parameter, by its name above; NAN for a number that is none. Tolerances that were not given
- * follow; before the first step initial values that depend on it do, too. */
+/* A parameter, by its name above; NAN for a number that is none. The rules of a parameter are not
+ * checked. Tolerances that were not given follow, outputs in the next call; before the first step
+ * initial values that depend on it do, too. */
 double ${name}_get(const ${name}_state *s, int parameter);
 int ${name}_set(${name}_state *s, int parameter, double value);
 

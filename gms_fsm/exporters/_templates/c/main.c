@@ -64,10 +64,11 @@ $read        if (read != $count || !strchr("\r\n", *place)) {
             return 1;
         }
         code = ${name}_advance_to(&s, ${pairs}t, ${name}_MAX_STEPS);
-        if (code == ${name}_OK)
+        if (code == ${name}_OK) {
             write_row(&s);
-        if (switches)
-            write_switches(&s, switches);
+            if (switches)
+                write_switches(&s, switches);
+        }
     }
     if (switches)
         fclose(switches);
