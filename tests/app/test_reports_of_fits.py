@@ -42,6 +42,7 @@ def table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_the_page_names_its_files_every_parameter_and_score(folder: Path) -> None:
     written = {path.name for path in folder.iterdir()}

@@ -205,7 +205,7 @@ def test_the_entry_of_the_default_state_follows_a_number(tmp_path: Path) -> None
 
 
 # --------------------------------------------------------------------------- the program
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.parametrize("start", matrix([0.0, 0.5, 1.0], [0.0, 1.0]))
 def test_jumps_and_a_later_start(start: float, tmp_path: Path) -> None:
     friction = ChartModel(CHARTS["maxwell-slip"], {"k": 10.0, "F_c": 0.2}, sigma_2=0.1)

@@ -188,6 +188,7 @@ def test_several_records_are_one_experiment() -> None:
 
 
 # --------------------------------------------------------------------------- promises
+@pytest.mark.every(2)
 @pytest.mark.parametrize("bounds", [{}, {"z_c1": (2e-5, 2e-4), "z_c2": (2e-5, 1.1e-4)}])
 def test_elements_are_in_the_order_of_their_thresholds_unless_bounds_name_them(
     bounds: dict[str, tuple[float, float]],

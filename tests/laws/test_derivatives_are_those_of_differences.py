@@ -25,6 +25,7 @@ KINDS = (
 )  # fmt: skip
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", KINDS)
 def test_the_final_state_and_the_times_of_all_switches(name: str):
     run = corpus.run(name)

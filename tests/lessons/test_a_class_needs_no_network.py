@@ -112,14 +112,12 @@ CASES: list[tuple[Question, float | str | None, float | str]] = [
 
 
 @pytest.fixture(scope="module")
-def pages(ran: Ran, folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
-    made = {6: folder / "lesson_6_live.html"}
-    made[8] = live_page(ran(8)).save(tmp_path_factory.mktemp("page") / "lesson_8_live.html")
-    return made
+def lesson(folder: Path) -> Path:
+    return folder / "lesson_6_live.html"
 
 
-def test_a_page_judges_as_python_does(pages: dict[int, Path], open_page: Open) -> None:
-    page = open_page(pages[6])
+def test_a_page_judges_as_python_does(lesson: Path, open_page: Open) -> None:
+    page = open_page(lesson)
     for question, predicted, measured in CASES:
         fields = {name: getattr(question, name) for name in ("unit", "rtol", "atol", "tolerance")}
         given = json.dumps([fields, predicted, measured])
@@ -128,8 +126,8 @@ def test_a_page_judges_as_python_does(pages: dict[int, Path], open_page: Open) -
         assert math.isfinite(len(said))
 
 
-def test_a_lesson_opens_its_run_after_the_answers(pages: dict[int, Path], open_page: Open) -> None:
-    page = open_page(pages[6])
+def test_a_lesson_opens_its_run_after_the_answers(lesson: Path, open_page: Open) -> None:
+    page = open_page(lesson)
     assert not page.is_visible("#judged")
     assert not page.is_visible("#revealed")
     assert page.evaluate("document.querySelector('#numbers').closest('[inert]') !== null")
@@ -154,16 +152,17 @@ def test_a_lesson_opens_its_run_after_the_answers(pages: dict[int, Path], open_p
     assert "damping ratio" in page.locator("#revealed").inner_text()
 
 
-def test_what_is_no_number_is_asked_for_again(pages: dict[int, Path], open_page: Open) -> None:
-    page = open_page(pages[6])
+def test_what_is_no_number_is_asked_for_again(lesson: Path, open_page: Open) -> None:
+    page = open_page(lesson)
     page.fill("#answer-1", "a lot")
     page.click("#compare")
     assert page.locator("#answers output").first.inner_text().startswith("Give a number")
     assert not page.is_visible("#judged")
 
 
-def test_a_lesson_without_sliders_has_its_replay(pages: dict[int, Path], open_page: Open) -> None:
-    page = open_page(pages[8])
+@pytest.mark.matrix
+def test_a_lesson_without_sliders_has_its_replay(ran: Ran, tmp_path: Path, open_page: Open) -> None:
+    page = open_page(live_page(ran(8)).save(tmp_path / "lesson_8_live.html"))
     assert page.locator("#answer-3 option").all_inner_texts() == ["", "smaller", "same", "larger"]
     page.click("#compare")
     page.click("#to-run")

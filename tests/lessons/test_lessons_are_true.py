@@ -166,6 +166,7 @@ def test_lugre_drifts_and_gms_does_not_with_springs_only_or_after_a_slip(ran: Ra
 
 
 # ------------------------------------------------------------------ 3: the missed window
+@pytest.mark.matrix
 def test_the_switches_found_once_per_step_follow_from_the_grid(ran: Ran) -> None:
     """Four break-aways; then at a reversal that is hit four arrests, and until 61 s four more."""
     r = ran(3)
@@ -296,6 +297,7 @@ def test_the_loop_widens_up_to_C_over_s_and_closes_above(ran: Ran) -> None:
 
 
 # ------------------------------------------------------------------ 8: chart or if-else
+@pytest.mark.matrix
 def test_a_late_switch_leaves_a_spike_and_a_residual(ran: Ran) -> None:
     """sum sigma_i (dz_slip - v), with dz_slip = 0 at z = s; t* from the cosine of the motion."""
     r, w = ran(8), 2 * math.pi / 25
@@ -379,6 +381,7 @@ SHOWN = {  # "+" shows, "-" does not show, "!" shows wrongly; in the order of PH
 LOOP = "width of the inner loop at F = 0"
 
 
+@pytest.mark.matrix
 def test_verdicts_follow_from_numbers_far_from_their_limits(ran: Ran) -> None:
     r, signs = ran(10), {"shows": "+", "does not show": "-", "shows wrongly": "!"}
     assert r.states == dict(zip(l10.MODELS, (0, 1, 1, 4, 4), strict=True))
@@ -424,6 +427,7 @@ def test_the_smallest_model_that_will_do(ran: Ran) -> None:
 
 
 # ------------------------------------------------------------------ 11: what a record can tell
+@pytest.mark.matrix
 def test_an_excellent_fit_does_not_know_a_threshold_that_is_not_reached(ran: Ran) -> None:
     r = ran(11)
     slipped = [{*trace.transitions.element.tolist()} for trace in r.replayed.values()]
@@ -506,6 +510,7 @@ def test_only_the_product_of_scale_and_weights_is_told(ran: Ran) -> None:
 
 
 # ------------------------------------------------------------------ 12: what runs have not tried
+@pytest.mark.matrix
 def test_runs_by_hand_take_all_edges_and_miss_a_lost_sign(ran: Ran) -> None:
     r = ran(12)
     assert (r.edges_taken, r.with_third, r.runs_that_differ) == (2, 3, 0)

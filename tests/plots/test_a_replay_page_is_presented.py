@@ -229,6 +229,7 @@ def test_notes_beside_the_view_say_what_why_and_what_is_next(
     assert page.locator("#slides").is_visible()
 
 
+@pytest.mark.matrix
 def test_notes_in_a_window_of_their_own_follow_and_drive_the_page(
     open_page: Open, tmp_path: Path
 ) -> None:

@@ -100,6 +100,7 @@ def executed(begin: str, shown: Iterable[str], folder: Path) -> dict[str, Any]:
     return {cell.source: cell.outputs[0].data for cell in others}
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 def test_one_of_each_shows_itself_as_the_last_line_of_a_cell(tmp_path: Path) -> None:
     """Its text is short; `plots` is not imported before, nor ``%matplotlib inline`` run."""

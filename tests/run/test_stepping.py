@@ -160,6 +160,7 @@ def test_other_kinds_of_numbers(kind: Callable[[Any], Any]) -> None:
     assert one.advance(kind(1), kind(0), kind(2)) == other.advance(1.0, 0.0, 2.0)
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 @engines
 def test_joints_of_many_kinds_give_the_bits_of_joints_alone(engine: str) -> None:

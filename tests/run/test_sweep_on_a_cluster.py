@@ -57,6 +57,7 @@ quiet = pytest.mark.filterwarnings(
 )
 
 
+@pytest.mark.matrix
 @quiet
 def test_a_killed_worker_costs_no_result(cluster: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     model, rig = pulled_mass()
