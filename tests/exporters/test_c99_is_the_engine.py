@@ -227,6 +227,7 @@ def test_jumps_and_a_later_start(start: float, tmp_path: Path) -> None:
     assert table["t"].tolist().count(2.0) == 2
 
 
+@pytest.mark.matrix
 def test_a_broken_record_is_named(tmp_path: Path) -> None:
     export(stick_slip("signed"), "c99", tmp_path, name="it")
     program = built(tmp_path, "it", COMPILERS[0], QUICK)

@@ -68,6 +68,7 @@ def same(case: Case, folder: Path, **more: Any) -> Trace:
     return trace
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("name", matrix(["ball_screw_table", "servo"], ["servo"]))
 def test_a_scenario_has_the_same_bits_in_c_and_in_javascript(name: str) -> None:
     compilers = [(each, "-O2") for each in COMPILERS[:1]]
@@ -87,6 +88,7 @@ def test_functions_that_jump_have_the_same_bits(tmp_path: Path) -> None:
     assert len(trace.transitions) > 10
 
 
+@pytest.mark.matrix
 def test_events_and_conditions_that_last_have_the_same_bits(tmp_path: Path) -> None:
     friction, rig = run("conditions that last").subject
     (system,) = run("events at given times").subject

@@ -68,6 +68,7 @@ def test_a_friction_that_reads_everything(form: str) -> None:
         assert "## What it does not do" in readme
 
 
+@pytest.mark.matrix
 @pytest.mark.every(4)
 @pytest.mark.parametrize("form", ["c99", "js", "matlab", "modelica", "scxml", "st", "transitions"])
 def test_a_variable_starts_where_its_chart_says(form: str, tmp_path: Path) -> None:

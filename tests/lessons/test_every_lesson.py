@@ -217,6 +217,7 @@ def test_notebooks_in_the_repository_are_in_step(notebooks: ModuleType) -> None:
 
 # With ipywidgets, and nothing else of the extra docs, the site runs all lessons
 # (tests/docs/test_docs_build.py). Without it, `vary` draws once; one lesson has no slider.
+@pytest.mark.matrix
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name", matrix(["lesson_0", "lesson_1", "lesson_4", "desk_experiment"], ["desk_experiment"])

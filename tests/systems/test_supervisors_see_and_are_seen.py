@@ -336,6 +336,7 @@ def test_an_input_that_reads_the_force_that_it_makes_is_refused():
         )
 
 
+@pytest.mark.matrix
 @pytest.mark.every(2)
 @pytest.mark.parametrize("make", [hot_brake, thermostat])
 def test_the_command_line_runs_checks_and_exports_supervisors(gms_fsm: CommandLine, make):

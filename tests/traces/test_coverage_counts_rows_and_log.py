@@ -236,6 +236,7 @@ def _runs() -> list[Trace]:
     return [simulate(each.model, each.rig, 30.0, engine=FASTEST) for each in whats]
 
 
+@pytest.mark.matrix
 @pytest.mark.every(2)
 @pytest.mark.parametrize("t_eval", [None, [0.0, 12.0, 30.0]])
 def test_a_sweep_counts_as_its_runs_do(t_eval: list[float] | None) -> None:
