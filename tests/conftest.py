@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import gc
 import importlib.util
-import os
 from collections import Counter
 from pathlib import Path
 
@@ -32,12 +31,6 @@ SLOW_EXAMPLES = (
     "gms_fsm/exporters/alone.py",
     "gms_fsm/exporters/_registry.py",
 )
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Have one process more than processors: some tests wait for a browser or another program."""
-    return (os.cpu_count() or 1) + 1
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -73,6 +73,7 @@ def test_every_task_has_a_solution(folder: Path) -> None:
     assert tasks.count('class="answer"') == sum(len(LESSONS[n].questions) for n in CHOSEN)
 
 
+@pytest.mark.matrix
 def test_sheets_load_nothing_and_slides_fit_their_pages(folder: Path, open_page: Open) -> None:
     for name in SHEETS:
         page = open_page(folder / name)  # which fails at a request, or a message

@@ -266,6 +266,7 @@ def test_its_policy_has_hashes_only(live: Any) -> None:
         assert all(re.fullmatch(r"'sha256-[\w+/]+='", each) for each in rules[name].split())
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("size", SIZES)
 def test_axe_finds_nothing_and_nothing_is_beside_the_page(live: Any, size: str) -> None:
     page = live("servo", size=size)

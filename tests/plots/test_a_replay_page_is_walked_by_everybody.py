@@ -387,6 +387,7 @@ def test_until_reads_what_the_expression_language_reads(open_page: Open) -> None
 SCREENS = [("two", "laptop", "light"), ("published", "phone", "dark"), ("many", "tablet", "dark")]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("name", "size", "scheme"), SCREENS)
 def test_axe_finds_nothing_and_nothing_is_wider_than_the_screen(
     open_page: Open, name: str, size: str, scheme: str

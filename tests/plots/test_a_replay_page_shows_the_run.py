@@ -318,6 +318,7 @@ def test_zooming_a_browser_enlarges_the_text_of_charts(open_page: Open, name: st
 
 
 # --------------------------------------------------------------------------- two runs, systems
+@pytest.mark.matrix
 def test_two_runs_are_shown_at_the_same_time_with_their_first_difference(open_page: Open) -> None:
     page, laws = open_page("two", "laptop"), ("published", "signed")
     first, second = (box_of(page, f".run:nth-child({place}) .left") for place in (1, 2))
@@ -430,6 +431,7 @@ def test_a_supervisor_is_shown_and_chosen_as_a_contact_is(open_page: Open) -> No
     assert "calm: k" in texts_of(page, ".system h3 > span:first-child")
 
 
+@pytest.mark.matrix
 def test_a_page_of_supervisors_alone_has_no_empty_panel_and_names_events(open_page: Open) -> None:
     for size in ("laptop", "phone"):
         page = open_page("crossing", size)
@@ -530,6 +532,7 @@ def test_bristles_are_where_z_puts_them_and_move_with_the_ground_while_they_stic
     assert slid > 50
 
 
+@pytest.mark.matrix
 def test_bristles_of_every_kind_of_chart(open_page: Open) -> None:
     """A peg is a default state, or without bristles a locked one."""
     pegged = ("wear", "ball", "pad1")
