@@ -30,9 +30,9 @@ from gms_fsm.run.repeated.beginnings import (
     as_numbers,
     initial_size,
     periods_of,
+    shown_values,
     signals_given,
     signals_of,
-    told,
     with_initial,
     with_periods,
     with_signals,
@@ -191,7 +191,7 @@ def sweep(
         finally:  # also on Ctrl-C: pending tasks are not started
             for future in waiting:
                 future.cancel()
-    return collected.sweep({name: told(each) for name, each in values.items()})
+    return collected.sweep({name: shown_values(each) for name, each in values.items()})
 
 
 # --------------------------------------------------------------------------- parameters

@@ -168,7 +168,7 @@ def _is_smooth(text: str, system: System, span: tuple[float, float]) -> bool:
     return not rough_points(tree) and not rests
 
 
-def told(values: NDArray[Any]) -> NDArray[Any]:
+def shown_values(values: NDArray[Any]) -> NDArray[Any]:
     """Return what a result says of a parameter: numbers, or of signals their texts."""
     if values.dtype != object:
         return values
