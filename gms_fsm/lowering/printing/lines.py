@@ -7,6 +7,7 @@ on, until only arguments are left. Nothing is computed that nobody reads.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,12 +46,14 @@ TABLES = "the tables"  # what a signal that is a table reads
 class CodeLine(NamedTuple):
     """A line of text, and the names from the trees that it reads.
 
-    A lazy line stands for: compute this name here, unless it has been computed.
+    A lazy line stands for: compute these names here, unless they have been computed, and only if
+    the last of some lines before it finds that they are read.
     """
 
     text: str
     reads: frozenset[str] = frozenset()
-    lazy: str = ""
+    lazy: tuple[str, ...] = ()
+    only: tuple[CodeLine, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -268,16 +271,45 @@ class ProgramWriter(ABC):
                 rows[state] = [
                     line for line in made if line.text.split(" =")[0] not in seen
                 ] + lines
-        if len(rows) > 1:
-            rows = {state: self.lazily(lines) for state, lines in rows.items()}
+        ahead, rows = self.ahead(bank, rows) if len(rows) > 1 else ([], rows)
         body = [*before, *(self.by_state(bank, rows) if rows else []), *after]
         body = [*self.element(bank, first, signs), *body]
         if not body:
             return []
         text = f"for i in range({self.sizes[bank]}):"
-        return self.outward(
-            bank, [CodeLine(text, frozenset({f"#{self.sizes[bank]}"})), *indented(body)]
-        )
+        head = CodeLine(text, frozenset({f"#{self.sizes[bank]}"}))
+        return self.outward(bank, [*ahead, head, *indented(body)])
+
+    def ahead(
+        self, bank: int, rows: Mapping[str, list[CodeLine]]
+    ) -> tuple[list[CodeLine], dict[str, list[CodeLine]]]:
+        """Let what takes long be computed before a loop, if a state is active that reads it.
+
+        Inside the loop machine code would have it, and a test, once for each element.
+        """
+        readers = dict[str, list[str]]()
+        found = {state: self.lazily(lines) for state, lines in rows.items()}
+        for state, lines in found.items():
+            if lines and not lines[0].text:
+                for name in lines[0].lazy:
+                    readers.setdefault(name, []).append(state)
+                found[state] = lines[1:]
+        groups = dict[tuple[str, ...], list[str]]()
+        for name in (each for each in self.read.defined if each in readers):
+            groups.setdefault((*readers[name],), []).append(name)
+        states, size = self.names.states[bank], self.sizes[bank]
+        made = []
+        for active, names in groups.items():
+            test = " or ".join(f"{self.mode(bank)} == {states[each]}" for each in active)
+            before = (
+                CodeLine("found = False"),
+                CodeLine(f"for i in range({size}):", frozenset({f"#{size}"})),
+                CodeLine(f"    found = found or {test}"),
+                CodeLine("if found:"),
+            )
+            every = len(active) == len(states)
+            made.append(CodeLine("", lazy=(*names,), only=() if every else before))
+        return made, found
 
     def lazily(self, lines: list[CodeLine]) -> list[CodeLine]:
         """Let what takes long be computed in these lines, which may not be reached."""
@@ -286,7 +318,7 @@ class ProgramWriter(ABC):
         if not names:
             return lines
         without = [line._replace(reads=line.reads - {*names}) for line in lines]
-        return [*(CodeLine("", lazy=name) for name in names), *without]
+        return [CodeLine("", lazy=(*names,)), *without]
 
     @cached_property
     def long(self) -> frozenset[str]:
@@ -354,20 +386,21 @@ class ProgramWriter(ABC):
         Within a step velocities that locks determine are computed; elsewhere they are in y.
         """
         at_once = self.closure(reads_of(body))
-        lazy = dict.fromkeys(line.lazy for line in body if line.lazy and line.lazy not in at_once)
-        found = {name: self.defined(name, signs) for name in lazy}
+        times = Counter(name for line in body for name in line.lazy if name not in at_once)
         lines: list[CodeLine] = []
         for line in body:
-            if not line.lazy:
-                lines.append(line)
-            elif line.lazy in found:
-                name = self.local(line.lazy)
-                made = [CodeLine(f"if {name} != {name}:"), *indented(found[line.lazy])]
-                lines += [each._replace(text=line.text + each.text) for each in made]
-        first = [
-            CodeLine(f"{self.local(name)} = nan  # computed where it is read") for name in lazy
-        ]
-        head = self.head(reads_of(lines) - {*lazy}, signs, self.followed() if within else [])
+            made = [] if line.lazy else [line]
+            for name in (each for each in line.lazy if each in times):
+                found, own = self.defined(name, signs), self.local(name)
+                if times[name] > 1:
+                    found = [CodeLine(f"if {own} != {own}:"), *indented(found)]
+                made += found
+            if line.lazy and made:
+                made = [*line.only, *indented(made)] if line.only else made
+                made = [each._replace(text=line.text + each.text) for each in made]
+            lines += made
+        first = [CodeLine(f"{self.local(name)} = nan  # computed if it is read") for name in times]
+        head = self.head(reads_of(lines) - {*times}, signs, self.followed() if within else [])
         lines = [*head, *first, *lines] or [CodeLine("pass")]
         return [f"def {signature}:", f'    """{doc}"""', *(f"    {line.text}" for line in lines)]
 

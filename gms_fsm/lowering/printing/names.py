@@ -24,7 +24,7 @@ TEXT = frozenset(
     | {"piecewise_linear", "piecewise_slope", "range", "shared", "surface", "tables", "watch", "y"}
     | {"abs", "exp", "log", "sqrt", "sgn", "min", "max", "sin", "cos", "tanh", "atan", "asinh"}
     | {"floor", "round", "tooth", "noise", "pow", "pi", "F_i", "t", "jolt", "least", "mark", "skip"}
-    | {"was", *MARKS, *REASONS}
+    | {"found", "was", *MARKS, *REASONS}
 )
 
 
