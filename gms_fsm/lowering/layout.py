@@ -177,6 +177,10 @@ class SystemLayout:
         """Return what a component of the state vector is called for the user."""
         return name.split(".", 1)[-1] if len(self.banks) == 1 else name
 
+    def labelled(self, values: Sequence[float]) -> dict[str, Any]:
+        """Return one value for each component, by what they are called; of elements as lists."""
+        return {self.label(name): each for name, each in self.y.named(values).items()}
+
     @cached_property
     def events(self) -> tuple[str, ...]:
         """The events, as components of the state vector."""

@@ -187,7 +187,7 @@ def lower(system: System | Model, rig: Rig | None = None) -> Program:
             advice=f"simulate(system, t_end, inputs={{{system.open[0]!r}: ...}}), or "
             "system.with_inputs(...); SystemState takes them sample by sample",
         )
-    shape = _ProgramShape(_key(system), system)
+    shape = _ProgramShape(structure(system), system)
     corners = [s for s in system.signals.values() if isinstance(s, Corners)]
     return dataclasses.replace(
         _lowered(shape),
@@ -212,10 +212,10 @@ def same_text(one: System, other: System) -> bool:
 
     A Stribeck exponent of 2, and a number that is 0, give another text than others.
     """
-    return _key(one) == _key(other)
+    return structure(one) == structure(other)
 
 
-def _key(system: System) -> tuple[Any, ...]:
+def structure(system: System) -> tuple[Any, ...]:
     """Return everything that the text of a system depends on, in hashable form."""
     spelled = tuple(map(_spelling, system.signals.values()))
     # A ratio that is 1 or 0 is left out of no text; an inertia that is not positive is refused.

@@ -342,8 +342,7 @@ def _tolerances(
     if atol is not None and not isinstance(atol, Mapping):
         return [atol] * places.size, atol
     rows = {name: default[name] for name in (*places.shared, *places.own)}
-    by_name: Mapping[str, Any] = {} if atol is None else atol
-    for key, given in by_name.items():
+    for key, given in (atol or {}).items():
         with keyed("atol", key):
             name = _component(layout, key, "atol")
             here, size = f"atol[{key!r}]", len(rows[name])
@@ -351,11 +350,8 @@ def _tolerances(
                 rows[name] = [checked_scalar(here, given, "> 0")] * size
             else:
                 rows[name] = as_floats(checked_array(here, given, size, "> 0"))
-    found: dict[str, float | list[float]] = {
-        name: row if name in places.own else row[0] for name, row in rows.items()
-    }
-    used = {layout.label(name): row for name, row in found.items()}
-    return places.joined(found), used
+    joined = [rows[name][i or 0] for name, i in places]
+    return joined, layout.labelled(joined)
 
 
 def _without_scale(layout: SystemLayout, tolerances: list[float]) -> dict[str, float]:

@@ -24,10 +24,11 @@ from gms_fsm.run.recording.own_machines import engine_of, own_machines
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.run.recording.recording import Recorder, check_end, explained, interference_error
 from gms_fsm.run.recording.until import SeenUntil, Until
+from gms_fsm.run.repeated.again import runs_like
 from gms_fsm.run.settings import RunOptions, SettingOptions, Settings
 from gms_fsm.run.stepped.controlled import controlled
 from gms_fsm.systems.models import Model
-from gms_fsm.systems.mounted import arguments_of, with_inputs
+from gms_fsm.systems.mounted import arguments_of, mounted, with_inputs
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import SignalLike
 from gms_fsm.systems.system import System
@@ -144,12 +145,7 @@ def simulate(
     >>> len(trace.transitions)
     48
     """
-    if isinstance(engine, ElementMachines):
-        if machines is not None:
-            raise ParameterError(
-                "engine and machines are both machines", advice="give only one of them"
-            )
-        machines, engine = engine, "machines"
+    engine, machines = _given(engine, machines)
     given: SettingOptions = {**options} if engine is None else {**options, "engine": engine}  # type: ignore[typeddict-item]
     chosen = Settings.of(settings, "simulate", **given)
     on, end = arguments_of("simulate", model, rig, t_end)
@@ -159,24 +155,29 @@ def simulate(
         raise ParameterError(
             "it must be a function of the moment reached", place="progress", value=progress
         )
-    if is_asked(sensitivities):
+    if wish := is_asked(sensitivities):
         refuse_functions(model)  # what they return depends on the numbers, too
     model = controlled(model, end, chosen, t_start=t_start, initial=initial)
     path = None if checkpoint is None else checked_path("checkpoint", checkpoint)
     if machines is not None and chosen.engine == "ifelse":
         raise ParameterError("engine 'ifelse' uses no machines", advice="leave machines=... out")
-    start = Problem.of(model, on, end, chosen, t_start=t_start, initial=initial)
+    what = mounted(model, on, chosen.held_period)
+    special = initial, machines, progress, path, until, monitors or None, wish or None
+    like = runs_like(what, t_start, end, chosen, special)
+    if like is not None and (again := like.trace(what, chosen)) is not None:
+        return again
+    start = Problem.on(what, end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, start.what, start.output).values() if monitors else ()
     wanted = asked_for(start, sensitivities, until)
     own = {} if machines is None else own_machines(machines, start)
     stop = None if until is None else Until.of(start, until)
     if stop is not None:
         start = stop.start
-    run: CompiledRun | Run
-    if chosen.engine == "compiled":
-        run = CompiledRun(start, engine_of(start, own) if own else None)
-    else:
-        run = Run(start, own)
+    run: CompiledRun | Run = (
+        CompiledRun(start, engine_of(start, own) if own else None)
+        if chosen.engine == "compiled"
+        else Run(start, own)
+    )
     seen: Recording = run.recorder if stop is None else SeenUntil(stop, run.recorder)
     keeper = None if path is None else Checkpointer(run, path, checkpoint_every)
     try:
@@ -197,10 +198,23 @@ def simulate(
         raise
     if keeper is not None:
         keeper.finish()
+    if like is not None:
+        like.keep(start)
     trace = seen.trace()
     if wanted is not None:
         trace = replace(trace, derived=derived(start, wanted, len(trace.rows)))
     return watched(trace, watching) if watching else trace
+
+
+def _given(engine: Any, machines: Any) -> tuple[Any, Any]:
+    """Return an engine's name, and the user's machines, which may be given as the engine."""
+    if not isinstance(engine, ElementMachines):
+        return engine, machines
+    if machines is not None:
+        raise ParameterError(
+            "engine and machines are both machines", advice="give only one of them"
+        )
+    return "machines", engine
 
 
 def simulated(start: Problem, until: str | None = None) -> Trace:

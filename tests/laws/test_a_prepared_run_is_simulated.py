@@ -5,6 +5,8 @@ Whatever was run before in the same memory, whatever is recorded; errors too.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -29,6 +31,8 @@ from gms_fsm import (
 from gms_fsm.charts import CHARTS
 from gms_fsm.errors import GMSError
 from gms_fsm.identification.play_bank import SPRING_WITH_PLAY
+from gms_fsm.run.repeated import again
+from gms_fsm.run.repeated.block import RepeatedRun
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.numbers import known_in, value_in, varied
 from tests.corpus import CORPUS, FAILING, FEW, QUICK, each, run
@@ -57,9 +61,21 @@ def repeated(ready: Prepared, numbers: dict[str, Any]) -> tuple[Trace | None, st
         return getattr(error, "trace", None), f"{type(error).__name__}: {error}"
 
 
+@pytest.fixture
+def in_one_block(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
+    """Return a function that lets runs of `simulate` share a block, or not."""
+    shared: dict[Any, Any] = {}
+
+    def choose(chosen: bool) -> None:
+        monkeypatch.setattr(again, "_known", shared if chosen else {})
+        monkeypatch.setattr(again, "WORTH_IT", 1 if chosen else math.inf)
+
+    return choose
+
+
 @pytest.mark.every(6)
 @each([*CORPUS, *FAILING], {*FEW, *QUICK, *[*FAILING][::4]})
-def test_every_number_can_be_changed(name: str) -> None:
+def test_every_number_can_be_changed(name: str, in_one_block: Callable[[bool], None]) -> None:
     one = run(name)
     what = mounted(*one.subject)
     values = {
@@ -69,10 +85,12 @@ def test_every_number_can_be_changed(name: str) -> None:
     ready = prepare(*one.subject, one.t_end, **{**one.how, **how})
     for by in FACTORS:
         numbers = {each: by * u for each, u in values.items()}
+        in_one_block(False)
         theirs, why = alone(name, numbers, **how)
-        ours, too = repeated(ready, numbers)
-        assert too == why
-        assert other_parts(theirs, ours) == []
+        in_one_block(True)
+        for ours, too in (repeated(ready, numbers), alone(name, numbers, **how)):
+            assert too == why
+            assert other_parts(theirs, ours) == []
         if not why and theirs is not None and "t_eval" not in one.how:
             end, last = ready.end(numbers), theirs.rows
             assert (end.t, end.y) == (last.t[-1], tuple(last.y[-1].tolist()))
@@ -170,3 +188,20 @@ def test_its_derivatives_are_those_of_simulate(engine: str) -> None:
     for name in names:
         found = ready(numbers).sensitivity("z", name)
         np.testing.assert_array_equal(found, wanted.sensitivity("z", name))
+
+
+def test_ctrl_c_in_a_shared_block_leaves_the_part_before(
+    monkeypatch: pytest.MonkeyPatch, in_one_block: Callable[[bool], None]
+) -> None:
+    def stopped(run: RepeatedRun) -> None:
+        raise KeyboardInterrupt
+
+    in_one_block(True)
+    one = run("pulled mass")
+    whole = simulate(*one.subject, 2000.0, engine=FASTEST)
+    monkeypatch.setattr(RepeatedRun, "_make_room", stopped)
+    with pytest.raises(KeyboardInterrupt) as error:
+        simulate(*one.subject, 2000.0, engine=FASTEST)
+    part: Any = error.value.trace  # type: ignore[attr-defined]
+    assert 0 < len(part) < len(whole)
+    assert np.array_equal(part.rows.y, whole.rows.y[: len(part)])

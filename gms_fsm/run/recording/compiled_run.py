@@ -431,8 +431,8 @@ class Columns:
         """Return the trace of all recorded data."""
         return self.start.trace(*self.contents())
 
-    def contents(self) -> tuple[Rows, Rows, Firings]:
-        """Return the rows, both sides of every stop, and the log."""
+    def contents(self, *, copied: bool = False) -> tuple[Rows, Rows, Firings]:
+        """Return the rows, both sides of every stop, and the log; columns that are full as such."""
         start, log = self.start, self.log
         if start.output == "end":
             t, y, mode = self.latest
@@ -440,7 +440,7 @@ class Columns:
         else:
             self._complete()
             count, columns = self.buffers.out.row, self._columns()
-            self.handed_out = not self.packed and count == len(columns[0])
+            self.handed_out = not (copied or self.packed) and count == len(columns[0])
             if self.packed:
                 last = [packed(_rows(count, *columns))] if count else []
                 rows = joined([*self.packed, *last])

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.lowering.compiling import with_more
+from gms_fsm.lowering.compiling import packed, with_more
+from gms_fsm.lowering.program import Arguments
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import STEPS_AT_ONCE, WORTH_A_LOOK, Columns
 from gms_fsm.run.recording.counted import CountTables
@@ -83,6 +84,17 @@ class RepeatedRun:
                 self.own[row, : len(value) if np.ndim(value) else None] = value
             else:
                 self.own[row, element] = value
+
+    def put_all(self, p: Arguments) -> None:
+        """Return to the start, with all numbers of a system of the same text."""
+        self.put(())
+        self.shared[...], self.own[...] = packed(p)[:2]
+
+    @property
+    def size(self) -> int:
+        """Bytes of the columns of states."""
+        rows: Any = self.columns.buffers.out.rows_y
+        return int(rows.nbytes)
 
     def value(self, place: Place) -> Any:
         """Return a number that was put, or those of all elements."""
@@ -227,10 +239,7 @@ class RepeatedRun:
         """Copy rows, stops and log; what is returned makes the objects of them."""
         columns: Any = self.columns
         if columns.start.output != "all" or columns.packed:
-            found = columns.contents()
-            if columns.handed_out:
-                columns.replace_rows()
-                self._write()
+            found = columns.contents(copied=True)
             return lambda: found
         out, log = columns.buffers.out, columns.log
         count, fired = out.row, log.firings

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -106,9 +107,13 @@ class RepeatedRuns:
     """Runs that wait to be repeated, and where the numbers are in them."""
 
     def __init__(self, start: Problem) -> None:
-        self.start = start
-        self.known = known_numbers(start) if is_repeatable(start) else None
+        self.start, self.repeatable = start, is_repeatable(start)
         self.spare = list[RepeatedRun]()
+
+    @functools.cached_property
+    def known(self) -> dict[str, KnownNumber] | None:
+        """The numbers that can be put into a block; None if no run can be repeated."""
+        return known_numbers(self.start) if self.repeatable else None
 
     def run(self, given: Mapping[str, Any]) -> RepeatedRun | None:
         """Return a run with these numbers at its end; None if it cannot be a repeated one."""
@@ -122,10 +127,7 @@ class RepeatedRuns:
                 return None
             puts.append((one.place, value))
             found.append(one)
-        try:
-            run = self.spare.pop()
-        except IndexError:
-            run = RepeatedRun(self.start)
+        run = self.waiting()
         run.put(puts)
         if all(one.fits(run) for one in found) and self._move(given, found):
             run.follow()
@@ -133,6 +135,13 @@ class RepeatedRuns:
                 return run
         self.take_back(run)
         return None
+
+    def waiting(self) -> RepeatedRun:
+        """Return a run that nobody else has."""
+        try:
+            return self.spare.pop()
+        except IndexError:
+            return RepeatedRun(self.start)
 
     def cells(self, given: Mapping[str, NDArray[np.float64]]) -> NumberCells | None:
         """Return the numbers of many runs, shapes as for a sweep; None if some cannot be put."""
