@@ -25,7 +25,7 @@ from gms_fsm.lowering.generated import SIGNALS, load
 from gms_fsm.lowering.observing import on_surfaces
 from gms_fsm.lowering.printing.counting import Counting
 from gms_fsm.lowering.program import Arguments, Program, guarded
-from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
+from gms_fsm.systems.signals import first_after, piecewise_linear, piecewise_slope
 
 if TYPE_CHECKING:
     from integrators.machine_code.layout import MemoryBlock
@@ -113,7 +113,7 @@ def text_of(program: Program, more: str = "") -> str:
     """Return what machine code depends on: a program's text, more text, and what these call."""
     from integrators.runners.compiled import digest
 
-    return digest(sgn, piecewise_linear, piecewise_slope, text=program.source + more)
+    return digest(sgn, first_after, piecewise_linear, piecewise_slope, text=program.source + more)
 
 
 def _calls(program: Program) -> list[Callable[[float], float]]:

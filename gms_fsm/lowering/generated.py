@@ -24,13 +24,14 @@ from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.parser import PARSER
 from gms_fsm.foundation.text import visible
 from gms_fsm.language import ARGUMENTS, ELEMENTARY, NAMESPACE
-from gms_fsm.systems.signals import piecewise_linear, piecewise_slope
+from gms_fsm.systems.signals import first_after, piecewise_linear, piecewise_slope
 from integrators import elementary
 from integrators.machine_code import whole_numbers
 from integrators.runners import quick
 
-# What generated text calls besides the functions of the expression language.
+# What generated text calls besides the functions of the expression language, and what these call.
 SIGNALS: Mapping[str, Any] = {
+    "first_after": first_after,
     "piecewise_linear": piecewise_linear,
     "piecewise_slope": piecewise_slope,
     "nan": math.nan,
@@ -113,6 +114,8 @@ def standalone(source: str) -> str:
                 used.add(name)
             case ast.Name(id=name) | ast.arg(arg=name) | ast.FunctionDef(name=name):
                 own.add(name)
+    if used & {"piecewise_linear", "piecewise_slope"}:
+        used.add("first_after")  # which they call
     known: dict[str, Any] = {**NAMESPACE, **SIGNALS}
     python = {name for name, each in vars(builtins).items() if known.get(name, each) is each}
     missing = sorted(used - own - python)

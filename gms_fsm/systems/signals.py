@@ -240,6 +240,37 @@ def as_signal(given: SignalLike) -> Signal:
     )
 
 
+def first_after(t: float, times: Sequence[float]) -> int:
+    """Return the number of the first corner after t; how many there are if none is.
+
+    Corners that are evenly spaced, as in most records, are found at once.
+
+    Examples
+    --------
+    >>> first_after(1.0, [0.0, 1.0, 1.0, 2.0])
+    3
+    """
+    low, high = 0, len(times)
+    since, whole = t - times[0], times[high - 1] - times[0]
+    if since >= 0.0 and since < whole:
+        near = int(since / whole * (high - 1))
+        if times[near] <= t:
+            low = near + 1
+            if times[low] > t:
+                high = low
+        else:
+            high = near
+            if times[near - 1] <= t:
+                low = near
+    while low < high:
+        middle = (low + high) // 2
+        if times[middle] <= t:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
 def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) -> float:
     """Interpolate corners linearly at t; values are held outside, right-continuous at jumps.
 
@@ -253,13 +284,7 @@ def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) 
     >>> piecewise_linear(1.0, [0.0, 1.0, 1.0], [0.0, 2.0, 5.0])
     5.0
     """
-    low, high = 0, len(times)
-    while low < high:  # first corner after t
-        middle = (low + high) // 2
-        if times[middle] <= t:
-            low = middle + 1
-        else:
-            high = middle
+    low = first_after(t, times)
     if low == 0:
         return values[0]
     if low == len(times):
@@ -292,13 +317,7 @@ def piecewise_slope(t: float, times: Sequence[float], values: Sequence[float]) -
     >>> piecewise_slope(0.5, [0.0, 1.0, 1.0], [0.0, 2.0, 5.0])
     2.0
     """
-    low, high = 0, len(times)
-    while low < high:  # first corner after t
-        middle = (low + high) // 2
-        if times[middle] <= t:
-            low = middle + 1
-        else:
-            high = middle
+    low = first_after(t, times)
     if low == 0 or low == len(times):
         return 0.0
     return (values[low] - values[low - 1]) / (times[low] - times[low - 1])

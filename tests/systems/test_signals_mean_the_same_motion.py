@@ -6,6 +6,8 @@ with its value.
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,7 +16,7 @@ import numpy as np
 import pytest
 
 from gms_fsm import Prescribed, SimulationError, Trace, simulate
-from gms_fsm.systems.signals import Corners, Formula, as_signal, piecewise_linear
+from gms_fsm.systems.signals import Corners, Formula, as_signal, first_after, piecewise_linear
 from gms_fsm.traces.failures import NotFiniteError, SignalEndError
 from tests.helpers import stick_slip
 
@@ -113,6 +115,25 @@ def test_piecewise_linear_is_numpys_interpolation_between_jumps() -> None:
             float(np.interp(t, TIMES, VALUES)), abs=1e-15
         )
     assert piecewise_linear(1.0, [0.0, 1.0, 1.0, 1.0], [0.0, 1.0, 7.0, 9.0]) == 9.0
+
+
+SPACED = {
+    "evenly": (0.1 * np.arange(40)).tolist(),
+    "far from 0": (1e9 + 1e-3 * np.arange(30)).tolist(),
+    "growing": (1.3 ** np.arange(30)).tolist(),
+    "with jumps": [0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 5.0, 5.0],
+    "all of one time": [2.0] * 3,
+    "one": [2.0],
+    "of all sizes": [-1.7e308, -1.0, -5e-324, 0.0, 5e-324, 1e300, 1.7e308],
+}
+
+
+@pytest.mark.parametrize("times", SPACED.values(), ids=SPACED)
+def test_the_first_corner_after_a_time_is_that_of_a_bisection(times: list[float]) -> None:
+    near = [math.nextafter(t, way) for t in times for way in (-math.inf, math.inf)]
+    between = (2.0 * np.linspace(times[0] / 2, times[-1] / 2, 99)).tolist()
+    for t in [*times, *near, *between, math.inf, -math.inf]:
+        assert first_after(t, times) == bisect_right(times, t)
 
 
 @dataclass

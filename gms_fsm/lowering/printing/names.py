@@ -20,7 +20,8 @@ MARKS = {"JUMPED": JUMPED, "LET_GO": LET_GO, "ENDLESS": ENDLESS}
 REASONS = {"FOR_A_SIGN": FOR_A_SIGN, "FOR_A_GUARD": FOR_A_GUARD, "WAITING": WAITING}
 # Names that the text uses itself. What a user calls like one of them is called otherwise there.
 TEXT = frozenset(
-    {"dS", "dy", "edge", "held", "i", "j", "len", "machine", "mode", "n", "nan", "out", "own", "p"}
+    {"dS", "dy", "edge", "first_after", "held", "i", "j", "len", "machine", "mode", "n", "nan"}
+    | {"out", "own", "p"}
     | {"piecewise_linear", "piecewise_slope", "range", "shared", "surface", "tables", "watch", "y"}
     | {"abs", "exp", "log", "sqrt", "sgn", "min", "max", "sin", "cos", "tanh", "atan", "asinh"}
     | {"floor", "round", "tooth", "noise", "pow", "pi", "F_i", "t", "jolt", "least", "mark", "skip"}
