@@ -6,18 +6,20 @@ const GROWING = { // columns by what there is one entry of
 };
 
 function floats(text = "") {
-  const letters = atob(text.replace(/-(\d+)-/g, (_, count) => "A".repeat(count))), bytes = new Uint8Array(letters.length);
-  for (let k = 0; k < letters.length; k++) bytes[k] = letters.charCodeAt(k);
+  const letters = text.replace(/-(\d+)-/g, (_, count) => "A".repeat(count));
+  const bytes = Uint8Array.fromBase64?.(letters) ?? Uint8Array.from(atob(letters), (letter) => letter.charCodeAt(0));
   return new Float64Array(bytes.buffer);
 }
 
-// Room at first. Functions that are made a second time, for a larger memory, are ten times slower in some browsers; what is
-// not used of a memory costs nothing.
-const ROOMS = { rows: 32768, firings: 8192 };
+// Room at first, of rows at least. Functions that are made a second time, for a larger memory, are ten times slower in some
+// browsers; what is not used of a memory costs nothing.
+const ROOMS = { rows: 32768, firings: 8192 }, ROWS_IN_WORDS = 2 ** 22;
 
 class Engine {
   constructor({ known, image, functions }) {
     Object.assign(this, { known, image, make: functions, tables: floats(known.tables), rooms: { ...ROOMS } });
+    const width = GROWING.rows.reduce((sum, name) => sum + known.columns[name].width, 0);
+    this.rooms.rows = Math.max(ROOMS.rows, Math.floor(ROWS_IN_WORDS / width));
     this.fixed = Object.fromEntries(Object.entries(known.columns).map(([name, { data }]) => [name, floats(data)]));
     this.build();
   }
