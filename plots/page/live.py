@@ -57,7 +57,7 @@ LIVE = (
     "js/live/live.js",
     "js/live/matters.js",
 )
-ENGINE = "js/live/engine.js"
+ENGINE, WORKERS = "js/live/engine.js", "js/live/workers.js"
 LARGE = 200_000  # characters of an engine, which has its records; of such there is only one
 _TABLE = re.compile(r"\[\[?([\w.]+)\]\]?")
 _LINE = re.compile(r"([\w.]+) = (-?[\d.]\S*|\[[-\d.e+, ]+\])")
@@ -145,7 +145,8 @@ def play(
     data["runs"] = []
     texts = ",\n".join(each.text for each in engines)
     text = f"{part_text(ENGINE)}const ENGINES = [\n{texts},\n];\n"
-    return Replay(page_html(data, charts, text, LIVE, ("page.css", "js/live/live.css")))
+    styles = ("page.css", "js/live/live.css")
+    return Replay(page_html(data, charts, (text, part_text(WORKERS)), LIVE, styles))
 
 
 # --------------------------------------------------------------------------- variants

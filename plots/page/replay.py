@@ -299,15 +299,18 @@ def common_data() -> dict[str, Any]:
 def page_html(
     data: Mapping[str, Any],
     charts: Sequence[str],
-    engine: str = "",
+    engine: tuple[str, ...] = (),
     more: Sequence[str] = START,
     styles: Sequence[str] = ("page.css",),
 ) -> str:
-    """Return a page that shows data from `page_data`, with further scripts of its own."""
+    """Return a page that shows data from `page_data`, with further scripts of its own.
+
+    An engine, and what starts it, are read before anything else.
+    """
     plot_script, plot_style = _uplot()
     script = "".join([_elementary(), *map(part_text, (*SCRIPTS, *more))])
     style = "".join([_theme(), plot_style, *map(part_text, styles)])
-    scripts = " ".join(map(_hash, filter(None, (plot_script, engine, script))))
+    scripts = " ".join(map(_hash, (*engine, plot_script, script)))
     worker = "worker-src blob:; " * bool(engine)  # which has the policy of the page
     parts = {
         # Only the scripts written here may run; text from a trace cannot, even as markup.
@@ -320,7 +323,10 @@ def page_html(
         "data": _inert(data),
         "licence": f"uPlot, {_copyright(plot_script)}\n\n{MIT}",
         "uplot": plot_script,
-        "engine": f'<script id="engine">{engine}</script>\n' if engine else "",
+        "engine": "".join(
+            f"<script{name}>{text}</script>\n"
+            for name, text in zip((' id="engine"', ""), engine, strict=False)
+        ),
         "script": script,
     }
     # In one pass, so that placeholders inside the parts are left unchanged.

@@ -4,16 +4,7 @@
 const LATE = 200; // ms, after which a run is said to take long
 const SETTLED = 400; // ms without a change, after which the address is written and what changed is read aloud
 const THOUSANDS = new Intl.NumberFormat("en");
-const RUNNER = `
-const engines = [];
-onmessage = ({ data: { number, numbers } }) => {
-  const begin = performance.now(), found = kept((engines[number] ??= new Engine(ENGINES[number])).run(numbers));
-  const buffers = Object.values(found).filter((each) => each instanceof Float64Array).map(({ buffer }) => buffer);
-  postMessage({ found, took: performance.now() - begin }, buffers);
-};
-`;
-
-const live = { number: 0, busy: false, waiting: null, took: 0, worker: inWorker(RUNNER) };
+const live = { number: 0, busy: false, waiting: null, took: 0 };
 const variant = () => data.live.variants[live.number];
 
 // ------------------------------------------------------------------ runs
@@ -23,31 +14,23 @@ function wordsNow() {
   return [...dials.values()].filter((dial) => !dial.parts && dial.value !== dial.given.value).flatMap(({ name, value }) => words[name].map((word) => [word, value]));
 }
 
-// A worker that has the engines, and does what a text says.
-function inWorker(text, heard) {
-  const worker = new Worker(URL.createObjectURL(new Blob([$("#engine").textContent, text], { type: "text/javascript" })));
-  if (heard) worker.onmessage = ({ data: each }) => heard(each);
-  return worker;
-}
-
-// Computes a run, and hands it over with the number of its engine.
-function compute(numbers, then) {
-  live.waiting = { number: live.number, numbers, then };
+// Computes a run, or waits for one that is computed, and hands it over with the number of its engine.
+function compute(numbers, then, run = null) {
+  live.waiting = { number: live.number, numbers, then, run };
   if (!live.busy) ask();
 }
 
 function ask() {
-  const { number, numbers, then } = live.waiting;
+  const { number, numbers, then, run } = live.waiting;
   Object.assign(live, { waiting: null, busy: true });
   const late = setTimeout(() => $("#numbers").classList.add("busy"), LATE);
-  live.worker.onmessage = ({ data: { found, took } }) => (document.hidden ? setTimeout : requestAnimationFrame)(() => {
+  (run ?? computed(number, numbers)).then(({ found, took }) => (document.hidden ? setTimeout : requestAnimationFrame)(() => {
     clearTimeout(late);
     $("#numbers").classList.remove("busy");
     Object.assign(live, { busy: false, took });
     if (live.waiting) ask(); // while this one is drawn
     then(found, number);
-  });
-  live.worker.postMessage({ number, numbers });
+  }));
 }
 
 // ------------------------------------------------------------------ changes
@@ -282,7 +265,7 @@ function beginLive() {
     if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
     if (isChanged()) changed();
     else showRun(found, 0);
-  });
+  }, begun);
   buildPanel(); // meanwhile
   const t = readAddress();
   addEventListener("hashchange", () => {
