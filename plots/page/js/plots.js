@@ -170,7 +170,11 @@ class TimePlots {
   tell() { for (const { value, at } of this.plots) say(value, at()); }
 
   drawRibbons() {
-    const wide = span.max - span.min, least = sketching ? 1 / this.width() : 5e-4; // of a piece that is drawn
+    const wide = span.max - span.min, across = this.width(), least = sketching ? 1 / across : 5e-4; // of a piece that is drawn
+    const placed = (t) => { // in whole pixels while the run changes: most pieces stay where they are
+      const part = (t - span.min) / wide;
+      return 100 * (sketching ? Math.round(part * across) / across : part);
+    };
     for (const { contact, i, track } of this.tracks) {
       $(".note", track)?.remove();
       const { run } = contact, pieces = contact.pieces[i], nodes = [...track.children];
@@ -178,9 +182,9 @@ class TimePlots {
       for (let k = 0, to = 0; k < pieces.length; k++) {
         const from = Math.max(k ? run.t(pieces[k].from) : -Infinity, span.min);
         to = k + 1 < pieces.length ? run.t(pieces[k + 1].from) : run.t(run.rows - 1);
-        const width = (Math.min(to, span.max) - from) / wide;
+        const end = Math.min(to, span.max), width = (end - from) / wide;
         if (!(width > least)) continue;
-        const piece = nodes[count] ?? make("i", track), look = [pieces[k].mode, (100 * (from - span.min)) / wide, 100 * width].join();
+        const piece = nodes[count] ?? make("i", track), left = placed(from), look = [pieces[k].mode, left, placed(end) - left].join();
         count += 1;
         if (piece.look === look) continue; // as before
         piece.look = look;
@@ -243,9 +247,9 @@ function alongColumns({ get, run }, { from }) {
   const rows = frames.rows[run.place], found = new Array(2 * from.length - 2);
   for (let c = 0; c + 1 < from.length; c++) {
     let low = Infinity, high = -Infinity, rises = true, gap = false;
-    for (let k = from[c]; k < from[c + 1]; k++) {
-      if (k > 0 && rows[k] === rows[k - 1]) continue;
-      const u = get(rows[k]);
+    const first = from[c], end = rows[from[c + 1] - 1];
+    for (let row = rows[first] + (first > 0 && rows[first] === rows[first - 1]); row <= end; row++) {
+      const u = get(row);
       if (!Number.isFinite(u)) { gap = true; continue; }
       if (u < low) { low = u; rises = false; }
       if (u > high) { high = u; rises = true; }

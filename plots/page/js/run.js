@@ -95,7 +95,7 @@ class Contact {
 
   take({ initial, switches, log }) {
     const { run } = this, [fired, elements, edges, made, late] = log;
-    this.powers = {};
+    Object.assign(this, { powers: {}, sizes: {} });
     this.readSwitches(initial, switches);
     let next = 0;
     this.log = Array.from(fired, (row, k) => ({
@@ -116,11 +116,14 @@ class Contact {
   // A value of a quantity as text, in one unit for all rows and runs: a threshold in that of the variable it bounds.
   tell(name, u, digits) {
     const key = name === "s" ? this.variables[0] ?? name : name, unit = unitOf(this, name);
-    this.powers[key] ??= powerOf(largest(extent(runs.flatMap(({ contacts, rows }) => {
-      const found = contacts.filter((each) => each.name === this.name).flatMap((each) => each.columns[key] ?? []);
-      return found.map((get) => ({ get, rows }));
-    }))), unit);
+    this.powers[key] ??= powerOf(Math.max(...runs.flatMap(({ contacts }) => contacts).filter((each) => each.name === this.name && each.columns[key]).map((each) => each.size(key))), unit);
     return inUnit(u, unit, this.powers[key], digits);
+  }
+
+  // The largest size of a quantity that has columns.
+  size(name) {
+    const { run: { rows } } = this;
+    return (this.sizes[name] ??= largest(extent([this.columns[name]].flat().map((get) => ({ get, rows })))));
   }
 
   parameter(name, element) {
@@ -206,28 +209,27 @@ class Contact {
 // are shown next to micro-steps.
 class Frames {
   constructor(runs) {
-    const most = runs.reduce((sum, { rows }) => sum + rows, 0), t = new Float64Array(most), rows = runs.map(() => new Uint32Array(most));
-    const at = runs.map(() => 0);
+    const most = runs.reduce((sum, { rows }) => sum + rows, 0), t = new Float64Array(most);
+    const each = runs.map(({ times, order }) => ({ times, order, at: 0, rows: new Uint32Array(most) }));
     let count = 0;
     for (; ; count++) {
-      let least = Infinity, order = 0;
-      for (let k = 0; k < runs.length; k++) {
-        const i = at[k], { times, order: orders } = runs[k];
-        if (i < times.length && (times[i] < least || (times[i] === least && orders[i] < order))) [least, order] = [times[i], orders[i]];
+      let least = Infinity, first = 0;
+      for (const { times, order, at } of each) {
+        if (at < times.length && (times[at] < least || (times[at] === least && order[at] < first))) { least = times[at]; first = order[at]; }
       }
       if (least === Infinity) break;
       t[count] = least;
-      for (let k = 0; k < runs.length; k++) {
-        if (runs[k].times[at[k]] === least && runs[k].order[at[k]] === order) at[k] += 1;
-        rows[k][count] = Math.max(at[k] - 1, 0);
+      for (const run of each) {
+        if (run.at < run.times.length && run.times[run.at] === least && run.order[run.at] === first) run.at += 1;
+        run.rows[count] = Math.max(run.at - 1, 0);
       }
     }
     this.t = t.slice(0, count);
-    this.rows = rows.map((each) => each.slice(0, count));
+    this.rows = each.map(({ rows }) => rows.slice(0, count));
     // The first frame that shows each row.
     this.of = runs.map((run, k) => {
-      const found = new Uint32Array(run.rows);
-      for (let frame = this.t.length - 1; frame >= 0; frame--) found[this.rows[k][frame]] = frame;
+      const found = new Uint32Array(run.rows), rows = this.rows[k];
+      for (let frame = count - 1; frame >= 0; frame--) found[rows[frame]] = frame;
       return found;
     });
   }
