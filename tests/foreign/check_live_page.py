@@ -34,6 +34,12 @@ TIMED = """(numbers) => {
     }
     return times.sort((a, b) => a - b)[10];
 }"""
+# Whether the memory has room for the run as it was written: else it is computed twice.
+HAS_ROOM = """() => {
+    const engine = new Engine(ENGINES[0]), { rows } = engine.rooms;
+    engine.run([]);
+    return engine.rooms.rows === rows;
+}"""
 # Inputs, and runs that were drawn, per second.
 DRAGGED = """async (count) => {
     const dial = [...dials.values()].find(({ first, value }) => first && value > 0);
@@ -69,6 +75,7 @@ def test_all_floats_are_those_of_python(browser: Any, name: str, tmp_path: Path)
             bad, count, switches = bad + wrong, count + floats, switches + len(trace.firings)
     here, python = page.evaluate(TIMED), compiled_time(scenario)
     inputs, drawn = page.evaluate(DRAGGED, 100)
+    has_room = page.evaluate(HAS_ROOM)
     page.close()
     size = len(live_engine(scenario.start({}), name).text)
     print(
@@ -78,6 +85,7 @@ def test_all_floats_are_those_of_python(browser: Any, name: str, tmp_path: Path)
         f"{inputs:.0f} inputs/s, {drawn:.0f} drawn/s"
     )
     assert bad == 0
+    assert has_room
 
 
 def compiled_time(scenario: Any) -> float:

@@ -266,6 +266,12 @@ def test_its_policy_has_hashes_only(live: Any) -> None:
         assert all(re.fullmatch(r"'sha256-[\w+/]+='", each) for each in rules[name].split())
 
 
+def test_the_first_run_is_begun_before_the_rest_of_the_page_is_read(live: Any) -> None:
+    live("servo")
+    text = PAGES["servo"].read_text(encoding="utf-8")
+    assert text.index("const begun = ") < text.index("<header") < text.index('id="data"')
+
+
 @pytest.mark.every(4)
 @pytest.mark.parametrize("size", SIZES)
 def test_axe_finds_nothing_and_nothing_is_beside_the_page(live: Any, size: str) -> None:
