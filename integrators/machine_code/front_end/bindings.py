@@ -41,14 +41,16 @@ def own(work: Work, path: str, value: Value) -> Value:
     match value:
         case RecordValue(fields=fields):
             parts = {name: own(work, f"{path}.{name}", part) for name, part in fields.items()}
-            return replace(value, fields=parts)
+            same = all(part is fields[name] for name, part in parts.items())
+            return value if same else RecordValue(value.cls, parts)
         case NumberValue(expr=expr) if _changes(work, path, expr):
             return NumberValue(work.set(path, expr))
         case ArrayValue():
             place = [value.base] if value.index is None else [value.base, value.index]
             if any(_changes(work, path, each) for each in place):
                 return _placed(work, path, value)
-            return replace(value, dims=_lengths(work, path, value))
+            dims = _lengths(work, path, value)
+            return value if dims == value.dims else replace(value, dims=dims)
     return value
 
 
@@ -80,6 +82,8 @@ def _agree(work: Work, name: str, value: Value) -> None:
 
 def _differing(work: Work, path: str, a: Value, b: Value) -> Iterator[str]:
     """Yield the parts in which two values of a name differ."""
+    if a is b:
+        return
     match a, b:
         case NumberValue(), NumberValue():
             if a != b:

@@ -430,12 +430,13 @@ def _record(work: Work, cls: Any, node: ast.Call) -> Value:
 
 def _own_call(work: Work, function: Callable[..., Any], arguments: list[Value]) -> Value | None:
     """Return a call of another function of the subset."""
-    arguments = without_lengths(work.translator.source(function), arguments)
-    given_now, kinds = passed_of(arguments)
-    done = work.translator.translated(function, arguments, kinds)
+    translator = work.translator
+    arguments = without_lengths(translator.source(function), arguments)
+    given_now, kinds = passed_of(arguments, translator.forms)
+    done = translator.translated(function, arguments, kinds)
     name, result, slots = done.function.name, done.result, done.slots
     if isinstance(result, RecordValue | ArrayValue):  # it may contain what is passed
-        given_now, _ = passed_of([steady(work, each) for each in arguments])
+        given_now, _ = passed_of([steady(work, each) for each in arguments], translator.forms)
     passed = tuple(given_now)
     if result is None:
         work.out.append(Do(Invoke("", name, passed)))

@@ -14,8 +14,8 @@ from integrators.machine_code.front_end.bindings import bind
 from integrators.machine_code.front_end.sources import Source
 from integrators.machine_code.front_end.values import (
     ArrayValue,
-    FixedValue,
     NumberValue,
+    RecordForms,
     RecordValue,
     Value,
     with_locals,
@@ -35,43 +35,29 @@ def without_lengths(source: Source, arguments: Sequence[Value]) -> list[Value]:
     return given
 
 
-def passed_of(arguments: Sequence[Value]) -> tuple[list[Expr], tuple[Any, ...]]:
-    """Return what is passed for some arguments."""
+def passed_of(arguments: Sequence[Value], forms: RecordForms) -> tuple[list[Expr], tuple[Any, ...]]:
+    """Return what is passed for some arguments, and what their translation depends on."""
     passed: list[Expr] = []
     names: dict[Local, Expr] = {}
 
     def numbered(local: Local) -> Expr:
         """Return the parameter that stands for a local."""
         if local not in names:
-            names[local] = Local(local.kind, f"a{len(passed)}", local.to)
+            names[local] = Local(local.kind, f"a{len(passed)}")
             passed.append(local)
         return names[local]
 
-    def known(expr: Expr) -> Expr:
-        """Return an expression in terms of numbered parameters."""
-        return with_locals(expr, numbered)  # type: ignore[no-any-return]
-
-    def shape(value: Value, direct: bool) -> Any:
+    def shape(value: Value) -> Any:
         match value:
-            case NumberValue(expr=expr) if direct and not isinstance(expr, Const):
+            case NumberValue(expr=expr) if not isinstance(expr, Const):
                 passed.append(expr)
                 return "number", expr.kind, len(passed)
-            case NumberValue(expr=expr):
-                return "number", known(expr)
-            case ArrayValue(kind=kind, dims=dims) if direct:
+            case ArrayValue(kind=kind, dims=dims):
                 passed.append(value.beginning)
-                return "array", kind, len(passed), tuple(map(known, dims))
-            case ArrayValue(kind=kind, dims=dims, base=base, offset=offset, index=index):
-                lengths = tuple(map(known, dims))
-                at = None if index is None else known(index)
-                return "view", kind, lengths, known(base), offset, at
-            case RecordValue(cls=cls, fields=fields):
-                parts = tuple((name, shape(part, False)) for name, part in fields.items())
-                return "record", id(cls), parts
-            case FixedValue(value=fixed):
-                return "fixed", id(fixed)
+                return "array", kind, len(passed), *(with_locals(each, numbered) for each in dims)
+        return forms.shape(value, numbered)
 
-    return passed, tuple([shape(argument, True) for argument in arguments])
+    return passed, tuple([shape(argument) for argument in arguments])
 
 
 def take(work: Work, arguments: Sequence[Value]) -> None:

@@ -42,8 +42,9 @@ class NamesUsed:
     only_indexed: set[str]  # nothing but entries is used, none counted from the end
 
 
+@functools.lru_cache(maxsize=4096)  # a text is translated for each system, and most of them alike
 def names_of(definition: ast.AST) -> NamesUsed:
-    """Return what a text does with its names.
+    """Return what a text does with its names, which nobody changes.
 
     Examples
     --------
@@ -103,7 +104,7 @@ class Source:
         """The names of its parameters."""
         return [each.arg for each in self.definition.args.args]
 
-    @functools.cached_property
+    @property
     def names(self) -> NamesUsed:
         """What it does with its names."""
         return names_of(self.definition)

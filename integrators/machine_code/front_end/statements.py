@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Sequence
 
 from integrators.machine_code.front_end.bindings import bind, give, own
@@ -274,5 +275,6 @@ def _entry(work: Work, target: ast.expr) -> Load:
     raise work.error("only names, entries of arrays and numbers of dataclasses can be assigned")
 
 
+@functools.lru_cache(maxsize=4096)
 def _has_call(node: ast.expr) -> bool:
     return any(isinstance(each, ast.Call) for each in ast.walk(node))

@@ -21,7 +21,13 @@ from integrators.machine_code.front_end.expressions import FOREIGN, HostFunction
 from integrators.machine_code.front_end.passing import passed_of, take
 from integrators.machine_code.front_end.sources import Source, TranslationError, source_of
 from integrators.machine_code.front_end.statements import body
-from integrators.machine_code.front_end.values import ArrayValue, NumberValue, Value, leaves
+from integrators.machine_code.front_end.values import (
+    ArrayValue,
+    NumberValue,
+    RecordForms,
+    Value,
+    leaves,
+)
 from integrators.machine_code.front_end.work import Again, Learnt, Specialised, Work
 from integrators.machine_code.tree import (
     Address,
@@ -78,6 +84,7 @@ class Translator:
         self.inline = inline or {}
         self.module = Module()
         self.origins: dict[str, str] = {}  # by the name of a translation: the function's own
+        self.forms = RecordForms()
         self._done: dict[Any, Specialised] = {}
         self._sources: dict[int, Source] = {}
         self._kept: list[Any] = []  # objects whose `id` is part of a key
@@ -110,7 +117,7 @@ class Translator:
             If a line is not part of the subset.
         """
         self._names.add(name)
-        passed, types = passed_of(arguments)
+        passed, types = passed_of(arguments, self.forms)
         done = self.translated(function, arguments, types)
         parameters: dict[Local, None] = {}
         for argument in arguments:
@@ -175,7 +182,7 @@ class Translator:
         Specialised
             The same one for arguments of the same types.
         """
-        key = id(function), passed_of(arguments)[1] if types is None else types
+        key = id(function), passed_of(arguments, self.forms)[1] if types is None else types
         if key not in self._done:
             self._kept.append((function, arguments))
             self._done[key] = self._specialised(function, arguments)

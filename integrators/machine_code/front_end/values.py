@@ -202,3 +202,38 @@ def with_locals(part: Any, give: Callable[[Local], Expr]) -> Any:
         case RecordValue(cls=cls, fields=fields):
             return RecordValue(cls, {k: with_locals(each, give) for k, each in fields.items()})
     raise AssertionError(part)  # anything else would have been assigned to a local before
+
+
+class RecordForms:
+    """The forms of records that are passed in one module: each record is walked through once."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[Any, int] = {}
+        self._found: dict[int, tuple[RecordValue, int, list[Local]]] = {}  # by `id` of the record
+
+    def of(self, record: RecordValue) -> tuple[int, list[Local]]:
+        """Return the number of its form, and its locals in the order in which they appear."""
+        if (found := self._found.get(id(record))) is None:
+            names: dict[Local, Expr] = {}
+
+            def numbered(local: Local) -> Expr:
+                return names.setdefault(local, Local(local.kind, f"a{len(names)}"))
+
+            parts = [(k, self.shape(part, numbered)) for k, part in record.fields.items()]
+            number = self._numbers.setdefault((id(record.cls), *parts), len(self._numbers))
+            self._found[id(record)] = found = record, number, [*names]
+        return found[1:]
+
+    def shape(self, value: Value, numbered: Callable[[Local], Expr]) -> Any:
+        """Return what a translation depends on, in terms of numbered locals."""
+        match value:
+            case NumberValue(expr=expr):
+                return "number", with_locals(expr, numbered)
+            case ArrayValue(kind=kind, offset=offset):
+                parts = (*value.dims, value.base, value.index)
+                return "view", kind, offset, *(with_locals(each, numbered) for each in parts)
+            case RecordValue():
+                number, names = self.of(value)
+                return "record", number, *map(numbered, names)
+            case FixedValue(value=fixed):
+                return "fixed", id(fixed)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from integrators.machine_code.front_end.sources import Source, TranslationError
-from integrators.machine_code.front_end.values import ArrayValue, Value
+from integrators.machine_code.front_end.values import ArrayValue, RecordForms, Value
 from integrators.machine_code.tree import (
     Assign,
     Const,
@@ -56,6 +56,7 @@ class Translating(Protocol):
     """What the translation of one function needs of that of the module."""
 
     module: Module
+    forms: RecordForms
 
     def source(self, function: Callable[..., Any]) -> Source:
         """Return the text of a function."""
