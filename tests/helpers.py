@@ -33,6 +33,13 @@ FIG4_SINE = "0.15*sin(2*pi*t/25)"
 FIG3_FORCE = "min(0.25*t, max(0.25, 0.75 - 0.125*t)) + 0.1*sin(2*pi*2*(max(t, 4) - 4))"
 
 
+def needs(*packages: str, reason: str) -> None:
+    """Skip the tests of a file without these packages, which are imported only if the tests run."""
+    for name in packages:
+        if importlib.util.find_spec(name) is None:
+            pytest.skip(f"{name} is not installed: {reason}", allow_module_level=True)
+
+
 def matrix(every: Sequence[Any], kept: Collection[Any]) -> list[Any]:
     """Return values for `pytest.mark.parametrize`; those not kept are left to make foreign."""
     marks = pytest.mark.matrix

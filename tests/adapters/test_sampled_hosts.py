@@ -26,11 +26,9 @@ from tests.adapters.loops import (
     servo_in_pathsim,
     sled,
 )
-from tests.helpers import pulled_mass
+from tests.helpers import needs, pulled_mass
 
-control = pytest.importorskip("control", reason="systems of python-control are extra control")
-pathsim = pytest.importorskip("pathsim", reason="PathSim blocks are extra pathsim")
-from pathsim.blocks import Scope, Source  # noqa: E402
+needs("control", "pathsim", reason="they are extras of their names")
 
 MODEL, _ = pulled_mass()
 DT = 1.0 / 128.0  # s: steps add up without rounding
@@ -45,14 +43,19 @@ V = speed(T)
 
 
 def response(system: Any, t: Any = T, u: Any = V, x0: Any = 0.0) -> Any:
-    return control.input_output_response(system, t, u, x0)
+    from control import input_output_response
+
+    return input_output_response(system, t, u, x0)
 
 
 def driven(block: Any, *sources: Any, **options: Any) -> Any:
     """Return a simulation in PathSim that gives a block its inputs."""
+    from pathsim import Connection, Simulation
+    from pathsim.blocks import Source
+
     blocks = [Source(lambda t, each=each: float(each(t))) for each in sources]
-    wires = [pathsim.Connection(source, block[port]) for port, source in enumerate(blocks)]
-    return pathsim.Simulation([*blocks, block], wires, dt=DT, log=False, **options)
+    wires = [Connection(source, block[port]) for port, source in enumerate(blocks)]
+    return Simulation([*blocks, block], wires, dt=DT, log=False, **options)
 
 
 def in_control(friction: Any, *inputs: Callable[[Any], Any]) -> Any:
@@ -60,10 +63,13 @@ def in_control(friction: Any, *inputs: Callable[[Any], Any]) -> Any:
 
 
 def in_pathsim(friction: Any, *inputs: Callable[[Any], Any]) -> Any:
+    from pathsim import Connection
+    from pathsim.blocks import Scope
+
     block, scope = friction_block(friction, DT), Scope()
     simulation = driven(block, *inputs)
     simulation.add_block(scope)
-    simulation.add_connection(pathsim.Connection(block["F"], scope))
+    simulation.add_connection(Connection(block["F"], scope))
     simulation.run(10.0)
     return block, scope.read()
 
@@ -156,7 +162,9 @@ def test_a_response_begins_at_any_time_and_speed() -> None:
 
 @pytest.mark.slow
 def test_two_joints_are_two_systems() -> None:
-    both = control.interconnect(
+    from control import interconnect
+
+    both = interconnect(
         [friction_system(MODEL, DT, name=name) for name in ("hip", "knee")],
         inplist=["hip.v", "knee.v"],
         outlist=["hip.F", "knee.F"],
@@ -195,10 +203,13 @@ def test_the_servo_in_pathsim_is_reset_continued_and_stops_where_it_should() -> 
 
 @pytest.mark.slow
 def test_blocks_with_their_own_periods_do_not_disturb_each_other() -> None:
+    from pathsim import Connection, Simulation
+    from pathsim.blocks import Source
+
     fine, coarse, alone = (friction_block(MODEL, period) for period in (DT, 4 * DT, 4 * DT))
     source = Source(speed)
-    wires = [pathsim.Connection(source, fine, coarse)]
-    pathsim.Simulation([source, fine, coarse], wires, dt=DT, log=False).run(10.0)
+    wires = [Connection(source, fine, coarse)]
+    Simulation([source, fine, coarse], wires, dt=DT, log=False).run(10.0)
     driven(alone, speed).run(10.0)
     assert coarse.switches == alone.switches
     assert sequence(fine.switches) == sequence(coarse.switches)
@@ -244,10 +255,11 @@ def test_a_block_that_is_first_asked_later_begins_then() -> None:
 
 # --------------------------------------------------------------------------- a whole system
 def test_a_system_in_a_block_moves_as_simulate_says() -> None:
+    from pathsim import Connection, Simulation
+    from pathsim.blocks import Source
+
     block, source = system_block(sled(), 0.01, ["x", "pad.F"]), Source(lambda t: 3.0 * t)
-    pathsim.Simulation(
-        [source, block], [pathsim.Connection(source, block)], dt=0.01, log=False
-    ).run(1.0)
+    Simulation([source, block], [Connection(source, block)], dt=0.01, log=False).run(1.0)
     trace = simulate(sled(), block.system.t, inputs={"u": "3 * t"})
     assert block.system.value("x") == pytest.approx(trace.body("sled").x[-1], rel=1e-6)
     assert block.outputs["pad.F"] == pytest.approx(trace.contact("pad").F[-1], rel=1e-2)

@@ -16,14 +16,13 @@ import pytest
 
 from gms_fsm.app.scenario import Scenario
 from gms_fsm.exporters import FORMATS, formats
-from tests.helpers import ROOT, matrix
+from tests.helpers import ROOT, matrix, needs
 from tests.page_blocks import Page, agrees, blocks_of
 
 pytestmark = pytest.mark.slow
 
 EXTRA = "anywidget control llvmlite matplotlib pandas pathsim pygraphviz pyarrow uplot xarray z3"
-for module in EXTRA.split():
-    pytest.importorskip(module, reason="the pages use all extras")
+needs(*EXTRA.split(), reason="the pages use all extras")
 
 PAGES = [
     path

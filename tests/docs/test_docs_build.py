@@ -15,13 +15,12 @@ import pytest
 
 from gms_fsm.app.lessons import LESSONS
 from tests.docs.conftest import Built
-from tests.helpers import ROOT
+from tests.helpers import ROOT, needs
 
 pytestmark = pytest.mark.slow
 
 NEEDED = ("furo", "ipykernel", "ipywidgets", "latex2mathml", "myst_parser", "nbclient", "sphinx")
-for module in NEEDED:
-    pytest.importorskip(module, reason="building the site needs the extra 'docs'")
+needs(*NEEDED, reason="building the site needs the extra 'docs'")
 
 
 def fetched(tag: str, name: str) -> bool:

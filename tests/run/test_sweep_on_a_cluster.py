@@ -18,11 +18,11 @@ import pytest
 
 from gms_fsm import Prescribed, sweep
 from gms_fsm.run.repeated.collected import Collected
-from tests.helpers import pulled_mass, stick_slip
+from tests.helpers import needs, pulled_mass, stick_slip
 
 pytestmark = pytest.mark.slow
 
-distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+needs("dask", "distributed", reason="needs the extra cluster")
 
 RUNS = 64
 
@@ -35,7 +35,9 @@ def sets(runs: int = RUNS) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     """Two worker processes of one thread each, which are started again when they are killed."""
-    dask = pytest.importorskip("dask", reason="needs the extra cluster")
+    import dask
+    import distributed
+
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
@@ -48,6 +50,12 @@ def cluster() -> Iterator[Any]:
         ) as made,
     ):
         yield made
+
+
+def client_of(cluster: Any) -> Any:
+    from distributed import Client
+
+    return Client(cluster)
 
 
 quiet = pytest.mark.filterwarnings(
@@ -73,7 +81,7 @@ def test_a_killed_worker_costs_no_result(cluster: Any, monkeypatch: pytest.Monke
             os.kill(killed[0], signal.SIGKILL)
 
     monkeypatch.setattr(Collected, "take", taken)
-    with distributed.Client(cluster) as client:
+    with client_of(cluster) as client:
         workers = set(client.run(os.getpid).values())
         assert len(workers) == 2
         assert os.getpid() not in workers
@@ -109,7 +117,7 @@ def test_a_run_that_kills_every_worker_is_a_row_that_says_so(cluster: Any) -> No
     pytest.importorskip("llvmlite", reason="needs the extra fast")
     model, rig = pulled_mass()
     here = sweep(model, rig, 6.0, sets(8), engine="ifelse")
-    with distributed.Client(cluster) as client:
+    with client_of(cluster) as client:
         executor = client.get_executor()
         far = sweep(model, rig, 6.0, sets(8), executor=Deadly(executor))
         again = sweep(model, rig, 6.0, sets(8), executor=executor)
@@ -135,7 +143,7 @@ def test_a_signal_that_cannot_be_sent_is_a_row_that_says_so(cluster: Any) -> Non
             return 0.1 * t
 
     model, values = stick_slip("signed"), {"F_s": np.linspace(1.5, 1.9, 130)}
-    with distributed.Client(cluster) as client:
+    with client_of(cluster) as client:
         executor = client.get_executor()
         lost = sweep(model, Prescribed(velocity), 3.0, values, executor=executor, engine="ifelse")
         found = sweep(model, Prescribed("0.1*t"), 3.0, values, executor=executor, engine="ifelse")
