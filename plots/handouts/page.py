@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -35,7 +36,7 @@ from plots.output.graphviz import picture
 from plots.output.svg_artists import EXACT, drawn, smallest
 from plots.style import INK, MONO_FONT, PALE_GREY, SANS_FONT, TEXT_GREY, presets
 from plots.style.mathtext import Formulas, formula
-from plots.style.matplotlib import Axes, Figure, FigureCanvasAgg, rc_context
+from plots.style.matplotlib import Axes, Figure, FigureCanvasAgg, RendererBase, rc_context
 from plots.views.traces import check_trace
 
 PAGE = (595.276, 841.89)  # A4
@@ -147,6 +148,12 @@ class _Page:
 
     figure: Figure
 
+    @cached_property
+    def _renderer(self) -> RendererBase:
+        canvas: Any = FigureCanvasAgg(self.figure)  # half of its methods are untyped
+        found: RendererBase = canvas.get_renderer()
+        return found
+
     def text(self, x: float, y: float, text: str, size: float = TEXT, **look: Any) -> None:
         """Write a line; y is its upper end."""
         look = {"va": "top", "color": INK, **look}
@@ -165,9 +172,8 @@ class _Page:
 
     def size(self, text: str, size: float) -> tuple[float, float]:
         """Return width and height of a text."""
-        canvas: Any = FigureCanvasAgg(self.figure)  # half of its methods are untyped
         artist = self.figure.text(0, 0, text, fontsize=size)
-        box = artist.get_window_extent(canvas.get_renderer())
+        box = artist.get_window_extent(self._renderer)
         artist.remove()
         return box.width * 72 / self.figure.dpi, box.height * 72 / self.figure.dpi
 

@@ -20,8 +20,8 @@ PIXEL = 1.0
 def drawn_texts(figure: Figure) -> list[tuple[Text, Bbox]]:
     """Return the visible, non-empty texts of a figure, and their boxes in pixels."""
     canvas: Any = FigureCanvasAgg(figure)
-    canvas.draw()
     renderer = canvas.get_renderer()
+    figure.draw_without_rendering()
     hidden = set(_undrawn_labels(figure))
     found = [text for text in _texts(figure, renderer) if id(text) not in hidden]
     return [(text, Text.get_window_extent(text, renderer)) for text in found]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -249,8 +250,8 @@ def _judge_held_outputs(traces: Mapping[str, Trace]) -> list[Claim]:
     slow, fast = ramp[chosen], swing[chosen]
     factor = max(np.divide(one.largest, (PAPERS_FORCE, PAPERS_PLACE)).max() for one in (slow, fast))
     before = fast.largest_before
-    _, d3 = force_difference(traces["fig3_step"], traces["fig3_chart"])
-    x3 = _differences(traces["fig3_step"], traces["fig3_chart"], "x")[1]
+    sampled, located = _on_one_grid(traces["fig3_step"], traces["fig3_chart"])
+    d3, x3 = sampled.F - located.F, sampled.x - located.x
     v = traces["fig3_step"].sample(slow.t[slow.t >= 1.0]).v
     ahead = float(np.median(slow.place[slow.t >= 1.0] / v)) / slow.period
 
@@ -411,11 +412,12 @@ def force_difference(a: Trace, b: Trace) -> tuple[FloatArray, FloatArray]:
     (ndarray, ndarray)
         Each of shape (m,).
     """
-    return _differences(a, b, "F")
+    one, other = _on_one_grid(a, b)
+    return one.t, one.F - other.F
 
 
-def _differences(a: Trace, b: Trace, name: str) -> tuple[FloatArray, FloatArray]:
+@functools.lru_cache(maxsize=2)  # claims and figures ask for the same pairs
+def _on_one_grid(a: Trace, b: Trace) -> tuple[Trace, Trace]:
     even = np.arange(a.t[0], a.t[-1], 1 / SAMPLES_PER_SECOND)
     grid = np.union1d(even, [*b.transitions.t, a.t[-1]])
-    difference: FloatArray = getattr(a.sample(grid), name) - getattr(b.sample(grid), name)
-    return grid, difference
+    return a.sample(grid), b.sample(grid)

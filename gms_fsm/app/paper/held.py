@@ -7,6 +7,7 @@ to the sample time.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -77,6 +78,7 @@ class Lag:
         return float(np.abs(self.before).max())
 
 
+@functools.lru_cache(maxsize=8)  # claims and figures ask for the same runs
 def lag_of(held: Trace, inside: Trace) -> Lag:
     """Compare a run with held outputs with one that evaluates the law inside its steps.
 
