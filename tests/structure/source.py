@@ -28,9 +28,19 @@ class Source(NamedTuple):
         return cls(_name(path), path, text, ast.parse(text))
 
     @property
+    def nodes(self) -> tuple[ast.AST, ...]:
+        """All nodes of its tree."""
+        return _nodes(self.tree)
+
+    @property
     def is_package(self) -> bool:
         """Whether it is the module of a folder."""
         return self.path.endswith("/__init__.py")
+
+
+@functools.cache
+def _nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
+    return tuple(ast.walk(tree))
 
 
 def _name(path: str) -> str:

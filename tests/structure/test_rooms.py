@@ -172,7 +172,7 @@ def test_without_what_draws_a_notebook_shows_the_text(monkeypatch: pytest.Monkey
 def test_no_class_name_stands_twice() -> None:
     found = defaultdict(list)
     for name, source in sources().items():
-        for node in ast.walk(source.tree):
+        for node in source.nodes:
             if isinstance(node, ast.ClassDef):
                 found[node.name].append(name)
     assert {name: places for name, places in found.items() if len(places) > 1} == {}
@@ -183,7 +183,7 @@ def test_a_private_module_is_imported_in_its_own_room_only() -> None:
     wrong = set()
     for name, source in sources().items():
         here = name if source.is_package else name.rpartition(".")[0]
-        for node in ast.walk(source.tree):
+        for node in source.nodes:
             if isinstance(node, ast.ImportFrom) and node.module:
                 for each in node.names:
                     parts = f"{node.module}.{each.name}".split(".")

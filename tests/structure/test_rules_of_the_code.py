@@ -32,7 +32,7 @@ LONGEST_MODULE, LONGEST_FUNCTION = 600, 80  # lines, lines of code
 
 def evaluated(source: Source) -> Iterator[int]:
     """Nothing a user writes is evaluated as Python."""
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         called = node.func if isinstance(node, ast.Call) else None
         if isinstance(called, ast.Name) and called.id in ("eval", "exec", "compile"):
             yield called.lineno
@@ -40,7 +40,7 @@ def evaluated(source: Source) -> Iterator[int]:
 
 def switching(source: Source) -> Iterator[int]:
     """States are named in charts; code that compares with such a name has its own rule."""
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.Compare | ast.MatchValue):
             texts = (each.value for each in ast.walk(node) if isinstance(each, ast.Constant))
             if {"stick", "slip"} & {text for text in texts if isinstance(text, str)}:
@@ -49,7 +49,7 @@ def switching(source: Source) -> Iterator[int]:
 
 def asked(source: Source) -> Iterator[int]:
     """Behind the door nothing asks whether it is a system."""
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         named: list[ast.expr] = []
         if isinstance(node, ast.Call) and ast.unparse(node.func) in (
             "isinstance",
@@ -68,7 +68,7 @@ def asked(source: Source) -> Iterator[int]:
 
 def hiding(source: Source) -> Iterator[int]:
     """An error's reason is one field; advice is another."""
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ERRORS and node.args:
             first = node.args[0]
             parts = first.values if isinstance(first, ast.JoinedStr) else [first]
@@ -79,14 +79,14 @@ def hiding(source: Source) -> Iterator[int]:
 
 def named_errors(source: Source) -> Iterator[int]:
     """Errors are defined in one place, and those that keep a trace in another."""
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.ClassDef) and node.name.endswith(("Error", "Exception")):
             yield node.lineno
 
 
 def reading(source: Source) -> Iterator[int]:
     """Messages are for people; programs use the fields."""
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "str(error)":
             yield node.lineno
 
@@ -97,7 +97,7 @@ def of_friction(source: Source) -> Iterator[int]:
         if re.search(r"(?i)\b(?:slip|stick|friction|stribeck|bristle)\w*|gms", line):
             yield number
     known = {*sys.stdlib_module_names, "integrators", "numpy", "scipy", "llvmlite"}
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         modules: list[str] = []
         if isinstance(node, ast.Import):
             modules = [each.name for each in node.names]
@@ -111,14 +111,14 @@ def of_friction(source: Source) -> Iterator[int]:
 def leaving(source: Source) -> Iterator[int]:
     """Text leaves the program, as bytes or to a terminal, through `gms_fsm.foundation.text`."""
     inside = set[ast.AST]()  # of what only tells texts apart, or is made visible
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         called = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
         if isinstance(node, ast.Yield) or called.endswith(("sha256", ".update")):
             inside.update(ast.walk(node))
         given = map(ast.unparse, node.args) if isinstance(node, ast.Call) else ()
         if any(each.startswith(("visible", "encoded")) for each in given):
             inside.add(node)
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if not isinstance(node, ast.Call) or node in inside:
             continue
         called = ast.unparse(node.func)
@@ -134,7 +134,7 @@ def long(source: Source) -> Iterator[int]:
     lines = source.text.splitlines()
     if len(lines) > LONGEST_MODULE:
         yield len(lines)
-    functions = [each for each in ast.walk(source.tree) if isinstance(each, Function)]
+    functions = [each for each in source.nodes if isinstance(each, Function)]
     for node in functions:
         own = _lines(node)
         if len(own) <= LONGEST_FUNCTION:
@@ -365,7 +365,7 @@ def test_sections_are_for_what_the_documentation_shows() -> None:
     with_sections = {
         (each.path, min([node.lineno, *(one.lineno for one in node.decorator_list)]))
         for each in sources().values()
-        for node in ast.walk(each.tree)
+        for node in each.nodes
         if isinstance(node, Function) and SECTION.search(ast.get_docstring(node) or "")
     }
     assert len(with_sections) > 300
