@@ -9,16 +9,16 @@ import pytest
 from gms_fsm.errors import MissingExtraError
 from gms_fsm.foundation.extras import EXTRAS, missing
 from tests.helpers import ROOT
-from tests.structure.source import sources
+from tests.structure.source import Source, sources
 
 PAGE = (ROOT / "docs" / "platforms.md").read_text(encoding="utf-8")
 ONLY_SOMEWHERE = {"fcntl", "termios", "tty", "pty", "resource", "pwd", "grp", "msvcrt", "winreg"}
 ASKED = {"platform", "system", "machine", "name", "uname", "getuid", "fork", "O_NOFOLLOW"}
 
 
-def asks(tree: ast.AST) -> bool:
+def asks(source: Source) -> bool:
     """Return whether a module asks for the system, or imports what only some have."""
-    for node in ast.walk(tree):
+    for node in source.nodes:
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
             if node.value.id in ("sys", "os", "platform") and node.attr in ASKED:
                 return True
@@ -30,7 +30,7 @@ def asks(tree: ast.AST) -> bool:
 
 
 def test_the_list_is_complete() -> None:
-    found = {each.path for each in sources().values() if asks(each.tree)}
+    found = {each.path for each in sources().values() if asks(each)}
     fonts = {"plots/output/graphviz.py"}  # has folders of all systems, and asks for none
     listed = set(re.findall(r"^\| `(\S+\.py)` \|", PAGE, re.MULTILINE))
     assert listed == {path for path in found if path.startswith(("gms_fsm", "plots"))} | fonts

@@ -18,6 +18,7 @@ from integrators.machine_code.front_end.values import (
     RecordForms,
     RecordValue,
     Value,
+    renamed,
     with_locals,
 )
 from integrators.machine_code.front_end.work import Work
@@ -65,41 +66,34 @@ def take(work: Work, arguments: Sequence[Value]) -> None:
     names = work.source.parameters
     if len(names) != len(arguments):
         raise work.error(f"it takes {len(names)} arguments, not {len(arguments)}")
-    known: dict[Local, Expr] = {}
+    known: dict[Local, Local] = {}
 
     def parameter(name: str, kind: str, to: str = "") -> Local:
         local = Local(kind, f"{name}.{len(work.parameters)}.", to)
         work.parameters[local] = None
         return local
 
-    def own(expr: Expr, name: str) -> Expr:
-        def given(local: Local) -> Expr:
-            if local not in known:
-                first = local.name.partition(".")[0] or name
-                kept = first if local.kind == "p" else name
-                known[local] = parameter(kept, local.kind, local.to)
-            return known[local]
+    def own(local: Local, name: str) -> Local:
+        if local not in known:
+            first = local.name.partition(".")[0] or name
+            known[local] = parameter(first if local.kind == "p" else name, local.kind, local.to)
+        return known[local]
 
-        return with_locals(expr, given)  # type: ignore[no-any-return]
-
-    def bound(value: Value, name: str, direct: bool) -> Value:
+    def bound(value: Value, name: str) -> Value:
         match value:
-            case NumberValue(expr=expr) if direct and not isinstance(expr, Const):
+            case NumberValue(expr=expr) if not isinstance(expr, Const):
                 return NumberValue(parameter(name, expr.kind))
-            case NumberValue(expr=expr):
-                return NumberValue(own(expr, name))
-            case ArrayValue(kind=kind, dims=dims) if direct:
-                local = parameter(name, "p", kind)
-                return ArrayValue(kind, tuple(own(each, name) for each in dims), local)
-            case ArrayValue(kind, dims, base, offset, index, its_name, empty):
-                lengths = tuple([own(each, name) for each in dims])
-                at = None if index is None else own(index, name)
-                return ArrayValue(kind, lengths, own(base, name), offset, at, its_name, empty)
-            case RecordValue(cls=cls, fields=fields):
-                return RecordValue(cls, {k: bound(v, k, False) for k, v in fields.items()})
+            case ArrayValue(kind=kind, dims=dims):
+                place = parameter(name, "p", kind)
+                lengths = [with_locals(each, lambda local: own(local, name)) for each in dims]
+                return ArrayValue(kind, tuple(lengths), place)
+            case RecordValue():
+                for local, field in work.translator.forms.of(value)[1].items():
+                    own(local, field)
+                return renamed(value, known)
         return value
 
-    values = [bound(each, name, True) for name, each in zip(names, arguments, strict=True)]
+    values = [bound(each, name) for name, each in zip(names, arguments, strict=True)]
     for name, value in zip(names, values, strict=True):
         if name in work.assigned:
             work.assigned[name] += 1

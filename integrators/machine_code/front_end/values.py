@@ -204,25 +204,62 @@ def with_locals(part: Any, give: Callable[[Local], Expr]) -> Any:
     raise AssertionError(part)  # anything else would have been assigned to a local before
 
 
+class Renamed(Mapping[str, Value]):
+    """The fields of a record with other locals; each is made when it is asked for."""
+
+    def __init__(self, record: RecordValue, names: Mapping[Local, Local]) -> None:
+        self.record, self.names = record, names
+        self._made: dict[str, Value] = {}
+
+    def __getitem__(self, name: str) -> Value:
+        if name not in self._made:
+            self._made[name] = renamed(self.record.fields[name], self.names)
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.record.fields)
+
+    def __len__(self) -> int:
+        return len(self.record.fields)
+
+
+def renamed(value: Value, names: Mapping[Local, Local]) -> Value:
+    """Return a value with other locals; all that it has must be among the names."""
+    if isinstance(value, RecordValue):
+        return RecordValue(value.cls, Renamed(value, names))
+    return with_locals(value, names.__getitem__)  # type: ignore[no-any-return]
+
+
 class RecordForms:
-    """The forms of records that are passed in one module: each record is walked through once."""
+    """The forms of records that are passed in one module, and which locals are in each record."""
 
     def __init__(self) -> None:
         self._numbers: dict[Any, int] = {}
-        self._found: dict[int, tuple[RecordValue, int, list[Local]]] = {}  # by `id` of the record
+        self._found: dict[int, tuple[RecordValue, int, dict[Local, str]]] = {}  # by `id`
 
-    def of(self, record: RecordValue) -> tuple[int, list[Local]]:
-        """Return the number of its form, and its locals in the order in which they appear."""
+    def of(self, record: RecordValue) -> tuple[int, dict[Local, str]]:
+        """Return the number of its form, and its locals in order, each with its first field."""
         if (found := self._found.get(id(record))) is None:
-            names: dict[Local, Expr] = {}
-
-            def numbered(local: Local) -> Expr:
-                return names.setdefault(local, Local(local.kind, f"a{len(names)}"))
-
-            parts = [(k, self.shape(part, numbered)) for k, part in record.fields.items()]
-            number = self._numbers.setdefault((id(record.cls), *parts), len(self._numbers))
-            self._found[id(record)] = found = record, number, [*names]
+            self._found[id(record)] = found = record, *self._form(record)
         return found[1:]
+
+    def _form(self, record: RecordValue) -> tuple[int, dict[Local, str]]:
+        if isinstance(record.fields, Renamed):
+            number, fields = self.of(record.fields.record)
+            return number, {record.fields.names[local]: field for local, field in fields.items()}
+        names: dict[Local, Expr] = {}
+        fields = {}
+
+        def numbered(local: Local) -> Expr:
+            return names.setdefault(local, Local(local.kind, f"a{len(names)}"))
+
+        parts = []
+        for name, part in record.fields.items():
+            parts.append((name, self.shape(part, numbered)))
+            inside = self.of(part)[1] if isinstance(part, RecordValue) else {}
+            for local in names:
+                fields.setdefault(local, inside.get(local, name))
+        return self._numbers.setdefault((id(record.cls), *parts), len(self._numbers)), fields
 
     def shape(self, value: Value, numbered: Callable[[Local], Expr]) -> Any:
         """Return what a translation depends on, in terms of numbered locals."""
