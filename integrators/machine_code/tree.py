@@ -7,7 +7,8 @@ memory) and ``"p"`` (address). Names of locals are unique within a function.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Iterator
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -184,8 +185,8 @@ def may_write(expr: Expr) -> bool:
     return any(each.writes or any(u.kind == "p" for u in each.arguments) for each in made)
 
 
-def parts_of(expr: Expr) -> Iterator[Expr]:
-    """Yield an expression and all its parts, from left to right.
+def parts_of(expr: Expr) -> list[Expr]:
+    """Return an expression and all its parts, from left to right.
 
     Examples
     --------
@@ -193,21 +194,29 @@ def parts_of(expr: Expr) -> Iterator[Expr]:
     >>> [type(each).__name__ for each in parts_of(total)]
     ['Op', 'Local', 'Const']
     """
-    yield expr
-    below: tuple[Expr, ...] = ()
-    match expr:
-        case Op(operands=parts) | Invoke(arguments=parts):
-            below = parts
-        case Foreign(arguments=parts) | Callback(arguments=parts):
-            below = parts
-        case Logic(left=left, right=right):
-            below = left, right
-        case Choose(test=test, yes=yes, no=no):
-            below = test, yes, no
-        case Load(address=address) | AddressOf(address=address):
-            below = (address.base,) if address.index is None else (address.base, address.index)
-    for part in below:
-        yield from parts_of(part)
+    found: list[Expr] = []
+    waiting = [expr]
+    while waiting:
+        each = waiting.pop()
+        found.append(each)
+        if below := _BELOW.get(type(each)):
+            waiting += below(each)[::-1]
+    return found
+
+
+def _in_address(expr: Load | AddressOf) -> tuple[Expr, ...]:
+    address = expr.address
+    return (address.base,) if address.index is None else (address.base, address.index)
+
+
+_BELOW: Mapping[type[Expr], Callable[[Any], tuple[Expr, ...]]] = {
+    Op: operator.attrgetter("operands"),
+    Logic: operator.attrgetter("left", "right"),
+    Choose: operator.attrgetter("test", "yes", "no"),
+    Load: _in_address,
+    AddressOf: _in_address,
+    **dict.fromkeys((Invoke, Foreign, Callback), operator.attrgetter("arguments")),
+}
 
 
 def locals_in(expr: Expr) -> Iterator[Local]:
