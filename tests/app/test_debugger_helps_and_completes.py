@@ -13,10 +13,10 @@ from tests.app.test_debugger_transcripts import FIG_4, answers
 from tests.inspection.sessions import a_system, debugger, fig4, locked, warming
 
 BEFORE = {  # so that there is something to clear, to compare and to load
-    fig4: ("goto 20", "watch x", "b arrest", "poke z1=0.1", "run", "save mine.json"),
-    warming: ("goto 0.1", "watch x", "b arrest", "poke w1=0.1", "run", "save mine.json"),
-    a_system: ("watch w1", "b slip", "poke q1=0.1", "run", "save mine.json"),
-    locked: ("goto 5", "watch x", "b stuck", "poke x=0.1", "run", "save mine.json"),
+    fig4: ("goto 20", "watch x", "b arrest", "poke z1=0.1", "save mine.json"),
+    warming: ("goto 0.1", "watch x", "b arrest", "poke w1=0.1", "save mine.json"),
+    a_system: ("watch w1", "b slip", "poke q1=0.1", "save mine.json"),
+    locked: ("goto 5", "watch x", "b stuck", "poke x=0.1", "save mine.json"),
 }
 
 

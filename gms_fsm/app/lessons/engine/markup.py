@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import re
 import sys
 from collections.abc import Mapping
@@ -84,6 +85,7 @@ def asked_of(lesson: Lesson) -> str:
     return found
 
 
+@functools.lru_cache(maxsize=16)  # slides, solutions and live page show the same
 def picture_of(result: Result) -> str:
     """Return the figure of a lesson as an ``img`` that contains it."""
     figure: Any = result.lesson.figure(result)
