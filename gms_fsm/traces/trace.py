@@ -401,7 +401,8 @@ class Trace:
     @cached_property
     def program(self) -> Program:
         """The generated program of the run."""
-        return lower(self.what.system)
+        system = self.what.system  # a trace that is made later has its program from here on
+        return vars(self).get("program") or lower(system)
 
     @cached_property
     def seen(self) -> Mapping[str, FloatArray]:
