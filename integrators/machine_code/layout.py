@@ -370,19 +370,36 @@ class MemoryBlock:
         contents : named tuple or tuple
             Like the example; arrays inside the block are not looked at.
         """
-        layout, words, before = self.layout, self._words, self._columns
-        numbers = layout.look_at_numbers(contents)
+        numbers = self.layout.look_at_numbers(contents)
         for target, offset, number in zip(*self._targets, numbers, strict=True):
             target[offset] = number
-        for k, array in enumerate(layout.look_at_columns(contents)):
+        self.update_columns(contents)
+
+    def update_columns(self, contents: Any) -> list[slice]:
+        """Write where the columns are that are others than the last time.
+
+        Parameters
+        ----------
+        contents : named tuple or tuple
+            As for `update`.
+
+        Returns
+        -------
+        list of slice
+            The words of these columns.
+        """
+        words, before, written = self._words, self._columns, list[slice]()
+        for k, array in enumerate(self.layout.look_at_columns(contents)):
             if before[k] is not array:
-                place = layout.columns[k]
+                place = self.layout.columns[k]
                 assert array.dtype == place.dtype
                 assert array.flags.c_contiguous
                 before[k] = array
                 lengths = array.shape[: place.lengths]
                 address, _ = array.__array_interface__["data"]
-                words[place.offset : place.offset + 1 + place.lengths] = address, *lengths
+                written.append(slice(place.offset, place.offset + 1 + place.lengths))
+                words[written[-1]] = address, *lengths
+        return written
 
     def numbers(self) -> list[Const]:
         """Return what is in all words; truth values are eight in a word, as an integer."""

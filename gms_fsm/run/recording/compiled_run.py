@@ -222,13 +222,19 @@ class Columns:
 
     def place(self) -> None:
         """Write where the columns are, and all numbers except those of the system."""
+        self.block.update(self._filled())
+
+    def place_columns(self) -> list[slice]:
+        """Write where the columns are; return the words that have changed."""
+        return self.block.update_columns(self._filled())
+
+    def _filled(self) -> RecordArguments:
+        """Return what the block is to contain, except for the numbers of the system."""
         functions = self.run_of.functions
-        self.block.update(
-            self.run_of._replace(
-                functions=functions._replace(p=(*functions.p[:2], self.p[2])),
-                buffers=self.buffers,
-                tally=self._tally(),
-            )
+        return self.run_of._replace(
+            functions=functions._replace(p=(*functions.p[:2], self.p[2])),
+            buffers=self.buffers,
+            tally=self._tally(),
         )
 
     def _tally(self) -> RowTally:

@@ -227,13 +227,8 @@ class RepeatedRun:
 
     def _write(self) -> None:
         """Say where the columns are, now and whenever a run begins."""
-        scale = self.floats[self.scale]
-        self.columns.place()
-        self.floats[self.scale] = scale
-        words = self.columns.block.words
-        for offset, lengths, _ in self.columns.block.layout.column_offsets.values():
-            column = slice(offset, offset + 1 + lengths)
-            self.first[0][column] = words[column]
+        for column in self.columns.place_columns():
+            self.first[0][column] = self.columns.block.words[column]
 
     def taken(self) -> Callable[[], tuple[Rows, Rows, Firings]]:
         """Copy rows, stops and log; what is returned makes the objects of them."""
