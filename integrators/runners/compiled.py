@@ -106,15 +106,12 @@ class EntryPoint(NamedTuple):
         The parts of the block that are its first arguments, as in `BlockLayout.part`; all if empty.
     extra : tuple of str
         Integers that are passed besides the block.
-    vectors : bool
-        Whether it computes numbers side by side.
     """
 
     name: str
     function: Callable[..., Any]
     parts: str = ""
     extra: tuple[str, ...] = ()
-    vectors: bool = False
 
 
 RECORD = "functions machines buffers log recorded tally"
@@ -299,12 +296,7 @@ def _object(
             translator = translated(layout, entries, each=each)
             hot = {name for name, own in translator.origins.items() if own in HOT}
             made = llvm_text(translator.module)
-        vectors = entries[0].vectors
-        content = (
-            objects.compiled_at_once(made)
-            if at_once
-            else objects.compiled(made, hot, vectors=vectors)
-        )
+        content = objects.compiled_at_once(made) if at_once else objects.compiled(made, hot)
         if store is not None:
             store.put(name, content)
         notify(f"compiled in {time.perf_counter() - started:.1f} s")
@@ -559,5 +551,5 @@ def follower(
     text: str, arguments: FollowArguments, store: CodeStore | None, notify: Callable[[str], None]
 ) -> CompiledFunction:
     """Return `integrators.tangents.run.follow_run` as machine code, as `engine` does."""
-    entry = EntryPoint("entry", tangent_run.follow_run, extra=("steps",), vectors=True)
+    entry = EntryPoint("entry", tangent_run.follow_run, extra=("steps",))
     return _made(text, arguments, [entry], (), store, notify)
