@@ -169,15 +169,16 @@ def observe_rows(
     functions = block.contents.functions
     table = np.empty((t.size, len(kept)))
     shared, own, tables = packed(program.p)
-    rows = block.contents._replace(
-        t=np.ascontiguousarray(t),
-        y=np.ascontiguousarray(y),
-        mode=np.ascontiguousarray(mode),
-        table=table,
-        functions=functions._replace(p=(*functions.p[:2], tables)),
-    )
     functions.p[0][...], functions.p[1][...] = shared, own
-    block.update(rows)
+    block.update_columns(
+        block.contents._replace(
+            t=np.ascontiguousarray(t),
+            y=np.ascontiguousarray(y),
+            mode=np.ascontiguousarray(mode),
+            table=table,
+            functions=functions._replace(p=(*functions.p[:2], tables)),
+        )
+    )
     made.engine(block, kept.start, t.size)
     made.take_back(block)
     return table
@@ -232,21 +233,20 @@ _observers: dict[int, ReadyCode] = {}
 def _observer(program: Program) -> ReadyCode:
     from integrators.runners import compiled
 
-    check_llvmlite()
     layout, key = program.layout, id(program.functions)
     with _lock:
-        if key in _observers:
-            return _observers[key]
-        if len(_observers) >= MOST_ENGINES:
-            _observers.clear()
-        made = compiled.observer(
-            text_of(program),
-            functions(program)["observe"],
-            on_surfaces(program, functions(program), packed(program.p)),
-            (layout.y.size, layout.modes, layout.observed.size),
-            _calls(program),
-            store(),
-            notify,
-        )
-        _observers[key] = ReadyCode(*made, program.functions)
-        return _observers[key]
+        if (ready := _observers.get(key)) is None:
+            check_llvmlite()
+            if len(_observers) >= MOST_ENGINES:
+                _observers.clear()
+            made = compiled.observer(
+                text_of(program),
+                functions(program)["observe"],
+                on_surfaces(program, functions(program), packed(program.p)),
+                (layout.y.size, layout.modes, layout.observed.size),
+                _calls(program),
+                store(),
+                notify,
+            )
+            _observers[key] = ready = ReadyCode(*made, program.functions)
+        return ready

@@ -122,6 +122,10 @@ class Firings:
         mine = self.layout.contact(contact).elements
         return np.asarray((self.machine >= mine.start) & (self.machine < mine.stop))
 
+    def of_contact(self, name: str) -> Firings:
+        """Return the firings of a contact."""
+        return self if len(self.layout.banks) == 1 else self.at(self.within(name))
+
     def followed_by(self, other: Firings) -> Firings:
         """Return these firings and then those of another run of the same system."""
         return replace(

@@ -201,8 +201,7 @@ class Trace:
         if not self.what.named:
             return self
         every = self.firings if self.every is None else self.every
-        mine = every.at(every.within(bank.name))
-        chosen = replace(self, firings=mine, which=bank.name, every=every)
+        chosen = replace(self, firings=every.of_contact(bank.name), which=bank.name, every=every)
         vars(chosen).update({k: u for k, u in vars(self).items() if k in ("program", "seen")})
         return chosen
 
