@@ -61,13 +61,13 @@ def observe_row(
 ) -> None:
     """Observe one row: with live signs, but with sigmas on the surfaces that it slides on."""
     sliding = on.sliding
-    if len(sliding.sigma) > 0:
-        n, slid = len(mode) - len(sliding.flags), 0
-        for k in range(len(sliding.flags)):
-            if mode[n + k] != 0:
-                sliding.which[slid] = k
-                slid += 1
-        sliding.count = slid
+    n, slid = len(mode) - len(sliding.flags), 0
+    for k in range(len(sliding.flags)):
+        if mode[n + k] != 0:
+            sliding.which[slid] = k
+            slid += 1
+    sliding.count = slid
+    if len(sliding.flags) > 0 and slid > 0:
         look(observe, on, t, y, mode, out)
     else:
         observe(t, y, mode, sliding.live, on.functions.p, out)
