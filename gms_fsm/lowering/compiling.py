@@ -166,19 +166,12 @@ def observe_rows(
     """Return some results of `observe` for many rows, with all signs evaluated live."""
     made = _observer(program)
     block = made.block()
-    functions = block.contents.functions
-    table = np.empty((t.size, len(kept)))
     shared, own, tables = packed(program.p)
-    functions.p[0][...], functions.p[1][...] = shared, own
-    block.update_columns(
-        block.contents._replace(
-            t=np.ascontiguousarray(t),
-            y=np.ascontiguousarray(y),
-            mode=np.ascontiguousarray(mode),
-            table=table,
-            functions=functions._replace(p=(*functions.p[:2], tables)),
-        )
-    )
+    places, table = block.contents.functions.p, np.empty((t.size, len(kept)))
+    places[0][...], places[1][...] = shared, own
+    columns = {"t": t, "y": y, "mode": mode, "table": table, "functions.p.2": tables}
+    for name, column in columns.items():
+        block.place(name, np.ascontiguousarray(column))
     made.engine(block, kept.start, t.size)
     made.take_back(block)
     return table

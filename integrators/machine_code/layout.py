@@ -176,12 +176,15 @@ class BlockLayout:
         return {_path(self._example, place.way): place.offset for place in places}
 
     @functools.cached_property
+    def column_numbers(self) -> Mapping[str, int]:
+        """The number of each column, by its name."""
+        return {_path(self._example, each.way): k for k, each in enumerate(self.columns)}
+
+    @functools.cached_property
     def column_offsets(self) -> Mapping[str, tuple[int, int, int]]:
         """Of each column, by its name: the word of its address, its lengths, its width."""
-        return {
-            _path(self._example, each.way): (each.offset, each.lengths, each.width)
-            for each in self.columns
-        }
+        each = zip(self.column_numbers, self.columns, strict=True)
+        return {name: (place.offset, place.lengths, place.width) for name, place in each}
 
     def kinds(self) -> list[str]:
         """Return what is in each word: ``"f"``, ``"i"`` or, eight in each, ``"b"``."""
@@ -388,16 +391,32 @@ class MemoryBlock:
         list of slice
             The words of these columns.
         """
-        words, before, written = self._words, self._columns, list[slice]()
-        for k, array in enumerate(self.layout.look_at_columns(contents)):
-            if before[k] is not array:
-                place = self.layout.columns[k]
-                assert array.dtype == place.dtype
-                assert array.flags.c_contiguous
-                before[k] = array
-                lengths = array.shape[: place.lengths]
-                written.append(slice(place.offset, place.offset + 1 + place.lengths))
-                words[written[-1]] = _address(array), *lengths
+        found = self.layout.look_at_columns(contents)
+        columns = zip(self.layout.column_numbers.items(), found, strict=True)
+        return [self.place(name, u) for (name, k), u in columns if self._columns[k] is not u]
+
+    def place(self, name: str, array: Any) -> slice:
+        """Write where a column is.
+
+        Parameters
+        ----------
+        name : str
+            As in `BlockLayout.offset`.
+        array : ndarray
+            The column.
+
+        Returns
+        -------
+        slice
+            Its words.
+        """
+        k = self.layout.column_numbers[name]
+        place = self.layout.columns[k]
+        assert array.dtype == place.dtype
+        assert array.flags.c_contiguous
+        self._columns[k] = array
+        written = slice(place.offset, place.offset + 1 + place.lengths)
+        self._words[written] = _address(array), *array.shape[: place.lengths]
         return written
 
     def numbers(self) -> list[Const]:

@@ -341,8 +341,9 @@ class Columns:
         """Double the columns of the log."""
         _double(self.log, "t", "machine", "edge", "numbers")
 
-    def _columns(self) -> tuple[Any, ...]:
-        """Return the columns of rows."""
+    @property
+    def rows(self) -> tuple[Any, ...]:
+        """The columns of rows."""
         out, log = self.buffers.out, self.log
         return out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode
 
@@ -350,11 +351,11 @@ class Columns:
         """Take the rows that are complete out of their columns."""
         b = self.buffers
         taken, count = int(b.memory.taken), int(b.out.row)
-        rest = [column[taken:count].copy() for column in self._columns()]
-        self.packed += (packed(_rows(taken, *self._columns())),)
+        rest = [column[taken:count].copy() for column in self.rows]
+        self.packed += (packed(_rows(taken, *self.rows)),)
         if self.handed_out:
             self.replace_rows()
-        for column, rows in zip(self._columns(), rest, strict=True):
+        for column, rows in zip(self.rows, rest, strict=True):
             column[: count - taken] = rows
         b.memory.taken, b.out.row = 0, count - taken
 
@@ -366,7 +367,7 @@ class Columns:
         log: Any = self.log
         whole = [
             np.concatenate([*(getattr(each, name) for each in self.packed), column])
-            for name, column in zip(("t", "microstep", "y", "mode"), self._columns(), strict=True)
+            for name, column in zip(("t", "microstep", "y", "mode"), self.rows, strict=True)
         ]
         count = sum(map(len, self.packed))
         out.rows_t, log.rows_microstep, out.rows_y, log.rows_mode = whole
@@ -405,7 +406,7 @@ class Columns:
     def around(self, t: float) -> tuple[Place, Place | None]:
         """Return the last row at or before a time, and the next one."""
         start, count = self.start, self.buffers.out.row
-        parts = [*self.packed, Rows(*(column[:count] for column in self._columns()))]
+        parts = [*self.packed, Rows(*(column[:count] for column in self.rows))]
         times = np.concatenate([each.t for each in parts])
         row = int(np.searchsorted(times, t, "right")) - 1
         places = [_place(parts, i) for i in (row, row + 1) if 0 <= i < times.size]
@@ -437,16 +438,16 @@ class Columns:
         """Return the trace of all recorded data."""
         return self.start.trace(*self.contents())
 
-    def contents(self, *, copied: bool = False) -> tuple[Rows, Rows, Firings]:
-        """Return the rows, both sides of every stop, and the log; columns that are full as such."""
+    def contents(self) -> tuple[Rows, Rows, Firings]:
+        """Return the rows, both sides of every stop, and the log."""
         start, log = self.start, self.log
         if start.output == "end":
             t, y, mode = self.latest
             rows = Rows(np.array([t]), np.zeros(1, dtype=np.int64), np.array([y]), np.array([mode]))
         else:
             self._complete()
-            count, columns = self.buffers.out.row, self._columns()
-            self.handed_out = not (copied or self.packed) and count == len(columns[0])
+            count, columns = self.buffers.out.row, self.rows
+            self.handed_out = not self.packed and count == len(columns[0])
             if self.packed:
                 last = [packed(_rows(count, *columns))] if count else []
                 rows = joined([*self.packed, *last])

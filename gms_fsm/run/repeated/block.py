@@ -20,6 +20,7 @@ from gms_fsm.traces.rows import Rows
 from integrators import loop
 
 INITIAL = -2  # as machine code knows it
+ROWS = "buffers.out.rows_t", "log.rows_microstep", "buffers.out.rows_y", "log.rows_mode"
 
 
 class Place(NamedTuple):
@@ -227,14 +228,22 @@ class RepeatedRun:
 
     def _write(self) -> None:
         """Say where the columns are, now and whenever a run begins."""
-        for column in self.columns.place_columns():
-            self.first[0][column] = self.columns.block.words[column]
+        self._keep(self.columns.place_columns())
+
+    def _keep(self, words: Iterable[slice]) -> None:
+        """Let a run begin with words as they are now."""
+        for each in words:
+            self.first[0][each] = self.columns.block.words[each]
 
     def taken(self) -> Callable[[], tuple[Rows, Rows, Firings]]:
         """Copy rows, stops and log; what is returned makes the objects of them."""
         columns: Any = self.columns
         if columns.start.output != "all" or columns.packed:
-            found = columns.contents(copied=True)
+            found = columns.contents()
+            if columns.handed_out:
+                columns.replace_rows()
+                rows = zip(ROWS, columns.rows, strict=True)
+                self._keep(columns.block.place(name, each) for name, each in rows)
             return lambda: found
         out, log = columns.buffers.out, columns.log
         count, fired = out.row, log.firings
