@@ -56,15 +56,6 @@ def stays(t: float, y: Vector, mode: list[int], held: Vector, p: Any) -> None:
     """Set no component: none is determined by others."""
 
 
-class ArcMotion(NamedTuple):
-    """The flow on an arc, what is watched, and what follows, with the parameters of all."""
-
-    flow: Flow
-    margins: Margins
-    p: Any
-    follow: Follow
-
-
 @dataclass(slots=True, eq=False)
 class Now:
     """The state of a run; changed in place."""
@@ -85,6 +76,20 @@ class Now:
     mode: list[int]  # of each machine, shape (n,); frozen within a step
     held: Vector  # signs; frozen within a step
     floor: Vector  # absolute tolerances, shape (m,); they grow for components without a scale
+
+
+def moves_alone(t: float, now: Now, p: Any) -> None:
+    """Go on: nothing moves with the state."""
+
+
+class ArcMotion(NamedTuple):
+    """The flow on an arc, what is watched, and what follows, with the parameters of all."""
+
+    flow: Flow
+    margins: Margins
+    p: Any
+    follow: Follow
+    moved: Callable[..., Any] = moves_alone  # moved(t, now, p) once y is at t; now.t is before it
 
 
 def time_of(now: Now) -> float:

@@ -27,7 +27,8 @@ MARK = "d__"  # before the name of a value: its tangent
 FUNCTIONS = ("flow", "observe", "margins", "normal", "act", "tick", "follow")
 VECTORS = ("y", "dy", "out")  # arrays that have tangents
 IN_THEIRS = ("y", "dy")  # in lanes these are in the same vector
-OF_LANES = ("flow", "margins", "normal", "act", "tick", "follow")
+OF_LANES = ("rate", "flow", "margins", "normal", "act", "tick", "follow")
+FIXED = {"rate": "flow"}  # at fixed times: what they are besides, without tangents of t
 ZERO = "0.0"
 ROUNDING = 1e-12  # a difference that is set to 0 below this, relative to its terms, keeps its slope
 
@@ -108,8 +109,11 @@ def with_tangents(
     body: list[ast.stmt] = []
     for part in ast.parse(source).body:
         if isinstance(part, ast.FunctionDef):
-            if part.name in names:
-                body.append(_function(part, active, lanes))
+            own = part.name
+            for name in (own, *(fixed for fixed, of in FIXED.items() if of == own)):
+                if name in names:
+                    part.name = name
+                    body.append(_function(copy.deepcopy(part), active, lanes))
         else:
             body.append(part)
     return ast.unparse(ast.fix_missing_locations(ast.Module(body, [])))
@@ -230,7 +234,7 @@ class _TangentWriter:
         self, active: ActiveNumbers, function: ast.FunctionDef, lanes: LanePlaces | None
     ) -> None:
         self.places, self.lanes = active, lanes
-        self.active = {"t", *VECTORS}
+        self.active = {*VECTORS} if function.name in FIXED else {"t", *VECTORS}
         while True:  # until no more names depend on something that has a tangent
             before = len(self.active)
             for node in ast.walk(function):

@@ -52,7 +52,6 @@ from integrators.switching import jolts, sliding_bounds
 from integrators.tangents import motion
 from integrators.tangents import run as tangent_run
 from integrators.tangents import switches as tangent_switches
-from integrators.tangents.run import FollowArguments
 
 __all__ = [
     "CodeStore",
@@ -65,7 +64,6 @@ __all__ = [
     "edition",
     "engine",
     "example",
-    "follower",
     "is_known",
     "observer",
     "stepper",
@@ -365,6 +363,7 @@ def engine(
     notify: Callable[[str], None],
     more: Sequence[EntryPoint] = (),
     text_of_more: Callable[[], str] = str,
+    vectors: bool = False,
 ) -> CompiledFunction:
     """Return `integrators.runners.columns.record` as machine code for one system.
 
@@ -385,13 +384,15 @@ def engine(
         `CompiledFunction.extended` is asked for. As `OuterEntry`, ``"entry"`` is this engine.
     text_of_more : callable, optional
         Returns a text that changes with them.
+    vectors : bool
+        Whether the system's functions compute numbers side by side.
 
     Returns
     -------
     CompiledFunction
         To be called with a block, the largest number of steps, and whether to pause.
     """
-    record = EntryPoint("entry", columns.record, RECORD, ("steps", "pause"))
+    record = EntryPoint("entry", columns.record, RECORD, ("steps", "pause"), vectors)
     made = _made(text, arguments, [record], calls, store, notify)
     if more:
 
@@ -553,11 +554,3 @@ def observer(
     )
     entry = EntryPoint("entry", observing.observe_rows, extra=("start", "count"))
     return _made(text, rows, [entry], calls, store, notify), rows
-
-
-def follower(
-    text: str, arguments: FollowArguments, store: CodeStore | None, notify: Callable[[str], None]
-) -> CompiledFunction:
-    """Return `integrators.tangents.run.follow_run` as machine code, as `engine` does."""
-    entry = EntryPoint("entry", tangent_run.follow_run, extra=("steps",), vectors=True)
-    return _made(text, arguments, [entry], (), store, notify)

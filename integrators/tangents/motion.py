@@ -32,6 +32,7 @@ class LaneFunctions(NamedTuple):
     Each takes its own arguments, then the tangents of t, of the numbers, and of what it fills.
     """
 
+    rate: Callable[..., Any]  # the flow at a fixed time: whatever t has, its tangents do not count
     flow: Callable[..., Any]
     margins: Callable[..., Any]
     normal: Callable[..., Any]
@@ -81,6 +82,8 @@ class TangentCourse:
     instant: int  # whether the last arc has ended
     changed: int  # how many comparisons have ended it
     moving: int  # whether the tangents are at an instant that moves
+    fresh: int  # whether an arc begins, of which no slope is known
+    finite: int  # whether all tangents were finite where the arc began, and are
     rows: int  # how many are kept
     fired: int
     next_time: int
@@ -105,6 +108,8 @@ class TangentCourse:
     t_t: Vector  # of the instant
     t_before: Vector  # of the last one
     slopes: list[Vector]  # of the margins, shape (relations, directions)
+    slope: list[Vector]  # of each group: that of the state and its tangents
+    steps: Vector  # ... and the longest step
     moves: list[Vector]  # of the numbers, lanes of each group: shared, then own ones
     scales: Vector
     # What is kept:
@@ -139,7 +144,7 @@ def rate_in_lanes(t: float, y: Vector, mode: list[int], held: Vector, on: Held, 
     if len(on.sliding.which) == 0 or on.sliding.count == 0:
         w = on.functions.p.lanes
         p = on.functions.p.functions.p
-        on.functions.p.tangents.flow(t, y, mode, held, p, dy, w.t, (w.shared, w.own))
+        on.functions.p.tangents.rate(t, y, mode, held, p, dy, w.t, (w.shared, w.own))
     else:
         slide_in_lanes(on, t, y, mode, dy)
 
@@ -221,6 +226,12 @@ def margins_in_lanes(
 
 
 # --------------------------------------------------------------------------- groups of directions
+def groups_of(traced: Traced) -> int:
+    """Return how many groups have a direction; the time, in the next place, may have one alone."""
+    lanes = len(traced.lanes.t)
+    return (traced.wide[0] + lanes - 1) // lanes
+
+
 def take_group(traced: Traced, group: int, y: Vector) -> None:
     """Put a state and the tangents of a group of directions into its lanes; of the time none."""
     w, S, size = traced.lanes, traced.course.S, len(y)

@@ -50,7 +50,8 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     returned = []
     machine = integrators.runners.compiled
 
-    def engine(program: Any, run: Any, counting: Any) -> Any:
+    def engine(program: Any, run: Any, counting: Any, tangents: str) -> Any:
+        assert not tangents
         inside = machine._longest(run) <= machine.LONGEST_INSIDE
         return SimpleNamespace(layout=BlockLayout(run, machine.is_known, inside=inside))
 

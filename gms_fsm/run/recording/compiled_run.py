@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SignalError
+from gms_fsm.gradients.directions import Directions
+from gms_fsm.gradients.following import LANES, TangentRun, as_columns
+from gms_fsm.gradients.sensitivities import Sensitivities
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
 from gms_fsm.lowering.printing.counting import Counting
-from gms_fsm.lowering.program import equations
+from gms_fsm.lowering.program import equations, machines_of
 from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.counted import CountTables, of_every_step
@@ -55,6 +59,8 @@ class CompiledRun:
         With the user's own machines: each firing is replayed through them.
     tables : CountTables, optional
         Where every step's row is counted; such a run keeps only its end.
+    wanted : Directions, optional
+        By what it is differentiated while it runs.
     """
 
     def __init__(
@@ -62,9 +68,10 @@ class CompiledRun:
         start: Problem,
         machines: MachineEngine | None = None,
         tables: CountTables | None = None,
+        wanted: Directions | None = None,
     ) -> None:
         self.start = start
-        self.columns = Columns(start, tables=tables)
+        self.columns = Columns(start, tables=tables, wanted=wanted)
         self.recorder: Recording = self.columns
         self.engine = machines
         self.next_look = PATIENCE
@@ -155,6 +162,8 @@ class Columns:
         Parameters that replace the program's own.
     tables : CountTables, optional
         Where rows are counted.
+    wanted : Directions, optional
+        By what the run is differentiated.
     """
 
     def __init__(
@@ -162,12 +171,14 @@ class Columns:
         start: Problem,
         p: compiled.Packed | None = None,
         tables: CountTables | None = None,
+        wanted: Directions | None = None,
     ) -> None:
         start = start if tables is None else of_every_step(start)
+        self.tangents = None if wanted is None else tangents_of(start, wanted)
         self.start, self.tables = start, tables
         layout = start.program.layout
         size, modes = layout.y.size, layout.modes
-        self.prepared = _prepared(start, None if tables is None else tables.counting)
+        self.prepared = _prepared(start, None if tables is None else tables.counting, self.tangents)
         self.engine, self.block = self.prepared.engine, self.prepared.block()
         # A method __del__ would run while the interpreter ends, too, where modules are emptied.
         weakref.finalize(self, self.prepared.take_back, self.block).atexit = False
@@ -200,9 +211,12 @@ class Columns:
         log.rows_microstep, log.rows_mode = rows_microstep, rows_mode
         log.stops_t, log.stops_microstep = stops_t, stops_microstep
         log.stops_y, log.stops_mode = stops_y, stops_mode
+        if self.tangents:
+            self.tangents.place(self._traced, start.options.rtol)
         self.packed: tuple[Rows, ...] = ()  # those before the rows in the columns
         self.handed_out = False  # whether a trace has the columns of rows, and not a copy
         self._begin()
+        self._make_room_for_tangents()
         if stops:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
@@ -216,16 +230,28 @@ class Columns:
 
     def write(self) -> None:
         """Write everything that machine code reads into the block."""
-        places: Any = self.run_of.functions.p
+        places = self.numbers
         places[0][...], places[1][...] = self.p[:2]
         self.place()
 
+    @property
+    def numbers(self) -> Any:
+        """Where the numbers of the system are in the block."""
+        return self._traced.functions.p if self.tangents else self.run_of.functions.p
+
+    @property
+    def _traced(self) -> Any:
+        """What functions with tangents have as parameters."""
+        return self.run_of.functions.p
+
     def place(self) -> None:
         """Write where the columns are, and all numbers except those of the system."""
-        functions = self.run_of.functions
+        functions, p = self.run_of.functions, (*self.numbers[:2], self.p[2])
+        if self.tangents:
+            p = self._traced._replace(functions=self._traced.functions._replace(p=p))
         self.block.update(
             self.run_of._replace(
-                functions=functions._replace(p=(*functions.p[:2], self.p[2])),
+                functions=functions._replace(p=p),
                 buffers=self.buffers,
                 tally=self._tally(),
             )
@@ -251,6 +277,20 @@ class Columns:
         start = self.start
         floor = start.options.floor or start.options.atol
         states.begin(self.buffers, start.t_start, start.y, start.mode, start.last, floor)
+        if self.tangents:
+            self.begin_tangents(self.tangents.directions.scales)
+
+    def begin_tangents(self, scales: FloatArray) -> None:
+        """Put tangents at the start, where the state is."""
+        assert self.tangents is not None
+        start, y = self.start, self.buffers.now.y
+        self.tangents.begin(self._traced.course, start.t_start, y, start.last, scales)
+
+    def derived(self) -> Sensitivities | None:
+        """Return the derivatives of a run that has reached its end."""
+        if self.tangents is None:
+            return None
+        return Sensitivities(self.tangents.directions, self.tangents.followed(self._traced.course))
 
     def empty(self) -> None:
         """Empty the columns and return to the start."""
@@ -330,6 +370,14 @@ class Columns:
             self.make_room_for_firings()
         if 0 < len(log.stops_t) <= log.stops:
             _double(log, "stops_t", "stops_microstep", "stops_y", "stops_mode")
+        self._make_room_for_tangents()
+
+    def _make_room_for_tangents(self) -> None:
+        """Lengthen the columns of tangents: as many rows and firings as in those of the run."""
+        if self.tangents:
+            out, log = self.buffers.out, self.log
+            rows, firings = len(out.rows_t) - out.row, len(log.t) - log.firings
+            self.tangents.make_room(self._traced.course, rows + 1, firings)
 
     def make_room_for_firings(self) -> None:
         """Double the columns of the log."""
@@ -461,16 +509,28 @@ class Columns:
 _known: dict[Any, compiled.ReadyCode] = {}
 
 
-def _prepared(start: Problem, counting: Counting | None) -> compiled.ReadyCode:
+def tangents_of(start: Problem, wanted: Directions) -> TangentRun:
+    """Return what a run has besides its own numbers, if it is differentiated."""
+    times = (start.last,) if start.output == "end" else start.options.times
+    return TangentRun(start.program, wanted, len(start.y), times, LANES if wanted.count > 1 else 1)
+
+
+def _prepared(
+    start: Problem, counting: Counting | None, tangents: TangentRun | None
+) -> compiled.ReadyCode:
     """Return what a run has in common with others: what moves, the method, and the sizes."""
     program = start.program
     flow = "flow" if start.options.located else "flow_live"
-    key = id(program.functions), flow, start.options.method, counting is not None
+    text = "" if tangents is None else tangents.texts["text"]
+    key = id(program.functions), flow, start.options.method, counting is not None, text
     if (ready := _known.get(key)) is None:
         if len(_known) >= compiled.MOST_ENGINES:
             _known.clear()
         run = example_of(start, counting)._replace(more=following_of(start))
-        engine = compiled.engine(program, run, counting)
+        if tangents is not None:
+            functions, machines = tangents.traced(run.functions, run.machines, 0.0, as_columns)
+            run = run._replace(functions=functions, machines=machines)
+        engine = compiled.engine(program, run, counting, text)
         _known[key] = ready = compiled.ReadyCode(engine, run, program.functions)
     return ready
 
@@ -485,7 +545,7 @@ def example_of(start: Problem, counting: Counting | None = None) -> RecordArgume
     p: Any = compiled.packed(program.p)
     return example(
         Functions(made[flow], made["arm"], made["margins"], made["normal"], made["follow"], p),
-        loop.Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
+        machines_of(made),
         hybrid.buffers(
             equations(program), start.t_start, start.y, start.mode, start.last, start.options, 0
         ),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import Bound, bounds_of
 from gms_fsm.foundation.arguments import unknown
+from gms_fsm.gradients.directions import Directions
 from gms_fsm.language import Value, names_in
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.repeated.block import Place, RepeatedRun
@@ -105,8 +106,8 @@ class NumberCells(NamedTuple):
 class RepeatedRuns:
     """Runs that wait to be repeated, and where the numbers are in them."""
 
-    def __init__(self, start: Problem) -> None:
-        self.start = start
+    def __init__(self, start: Problem, wanted: Directions | None = None) -> None:
+        self.start, self.wanted = start, wanted
         self.known = known_numbers(start) if is_repeatable(start) else None
         self.spare = list[RepeatedRun]()
 
@@ -125,7 +126,7 @@ class RepeatedRuns:
         try:
             run = self.spare.pop()
         except IndexError:
-            run = RepeatedRun(self.start)
+            run = RepeatedRun(self.start, wanted=self.wanted)
         run.put(puts)
         if all(one.fits(run) for one in found) and self._move(given, found):
             run.follow()
