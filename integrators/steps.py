@@ -78,7 +78,17 @@ class Now:
     floor: Vector  # absolute tolerances, shape (m,); they grow for components without a scale
 
 
-def moves_alone(t: float, now: Now, p: Any) -> None:
+class Scratch(NamedTuple):
+    """The attempted step."""
+
+    k: list[Vector]  # slopes of the stages, shape (stages, m)
+    y_new: Vector
+    f_new: Vector
+    error: Vector
+    dense: Dense
+
+
+def moves_alone(t: float, now: Now, scratch: Scratch, whole: bool, p: Any) -> None:
     """Go on: nothing moves with the state."""
 
 
@@ -89,22 +99,13 @@ class ArcMotion(NamedTuple):
     margins: Margins
     p: Any
     follow: Follow
-    moved: Callable[..., Any] = moves_alone  # moved(t, now, p) once y is at t; now.t is before it
+    # moved(t, now, scratch, whole, p) once y is at t, with now.t before it; whether by a whole step
+    moved: Callable[..., Any] = moves_alone
 
 
 def time_of(now: Now) -> float:
     """Return the time at which the system shows the state: one clock tick before a jump."""
     return min(now.t, now.seen)
-
-
-class Scratch(NamedTuple):
-    """The attempted step."""
-
-    k: list[Vector]  # slopes of the stages, shape (stages, m)
-    y_new: Vector
-    f_new: Vector
-    error: Vector
-    dense: Dense
 
 
 def coefficients(tableau: Tableau) -> Coefficients:

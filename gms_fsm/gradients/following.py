@@ -39,7 +39,8 @@ from integrators.tangents import switches
 from integrators.tangents.motion import LaneFunctions, Lanes, SlideLanes, TangentCourse, Traced
 from integrators.tangents.run import machines_that_note
 
-METHOD = coefficients(METHODS["dp45"])
+TABLEAU = METHODS["dp45"]
+METHOD = coefficients(TABLEAU)
 LANES = 4  # where there are several directions
 ROWS_AT_ONCE = 256
 FEW = 16  # first length of columns that grow
@@ -108,6 +109,10 @@ class TangentRun:
         Of the rows at which tangents are wanted, if not at all rows.
     lanes : int
         How many directions stand side by side.
+    rtol : float
+        The tolerance.
+    same : bool
+        Whether the run has the method of its tangents.
     """
 
     program: Program
@@ -115,6 +120,8 @@ class TangentRun:
     size: int
     times: Sequence[float] | Any | None
     lanes: int
+    rtol: float = 0.0
+    same: bool = False
 
     @functools.cached_property
     def wide(self) -> int:
@@ -130,7 +137,7 @@ class TangentRun:
 
     # ------------------------------------------------------------------ arguments
     def traced(
-        self, functions: Functions, machines: Machines, rtol: float, outside: Callable[[Any], Any]
+        self, functions: Functions, machines: Machines, outside: Callable[[Any], Any]
     ) -> tuple[Functions, Machines]:
         """Return functions and machines whose tangents are followed.
 
@@ -146,8 +153,9 @@ class TangentRun:
             machines,
             LaneFunctions(*(of_lanes[name] for name in LaneFunctions._fields)),
             METHOD,
-            [rtol],
+            [self.rtol],
             [int(self.times is None)],
+            [int(self.same)],
             [program.velocities],
             [self.directions.count],
             self._course(relations, outside),
@@ -244,10 +252,10 @@ class TangentRun:
         return np.ascontiguousarray(groups.reshape(groups.shape[0], -1))
 
     # ------------------------------------------------------------------ a run
-    def place(self, traced: Any, rtol: float) -> None:
+    def place(self, traced: Any) -> None:
         """Put the settings of a run, and columns of its own, into a block."""
-        traced.rtol[0], traced.every[0] = rtol, int(self.times is None)
-        traced.wide[0] = self.directions.count
+        traced.rtol[0], traced.every[0] = self.rtol, int(self.times is None)
+        traced.wide[0], traced.same[0] = self.directions.count, int(self.same)
         for name, column in self._columns(len(traced.course.watch)).items():
             setattr(traced.course, name, column)
 
@@ -304,7 +312,7 @@ def followed_in_python(
     """Run once more without machine code, and follow it; its rows are not kept."""
     program, (t, y, mode, last) = run.program, start
     plain, asked = equations(program).functions(located=True), machines_of(program.ieee)
-    functions, machines = run.traced(plain, asked, options.rtol, as_lists)
+    functions, machines = run.traced(plain, asked, as_lists)
     every = dataclasses.replace(options, times=None)
     b = hybrid.buffers(equations(program), t, y, mode, last, every, ROWS_AT_ONCE)
     on = Held(functions, b.now.held, b.sliding)

@@ -178,7 +178,7 @@ class Linear:
         program = self.program
         alone = TangentRun(program, self.directions, program.layout.y.size, None, lanes=1)
         plain, asked = equations(program).functions(located=True), machines_of(program.ieee)
-        return alone.traced(plain, asked, 0.0, as_lists)[0]
+        return alone.traced(plain, asked, as_lists)[0]
 
     # ------------------------------------------------------------------ switches
     def armed(self, t: float, y: list[float], mode: Modes) -> list[float]:

@@ -22,5 +22,6 @@ INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(("flow", "flow_live", 
 # Every step calls these.
 HOT = {
     "advance", "_along", "first_change", "_bracket", "_error", "interpolate", "margins",
-    "observe_rows", "_probe", "rate_in_lanes", "_search", "switch", "take_step", "weighted_sum",
+    "observe_rows", "_probe", "rate_in_lanes", "_search", "slope_in_lanes", "switch", "take_step",
+    "weighted_sum",
 }  # fmt: skip

@@ -147,7 +147,7 @@ class SciPyStepper:
             else:
                 y[:] = y_new
             motion.follow(t_new, y, now.mode, now.held, motion.p)
-            motion.moved(t_new, now, motion.p)
+            motion.moved(t_new, now, b.scratch, False, motion.p)
             now.t = t_new
             most_steps -= 1
             if out.every_step:

@@ -32,7 +32,7 @@ class LaneFunctions(NamedTuple):
     Each takes its own arguments, then the tangents of t, of the numbers, and of what it fills.
     """
 
-    rate: Callable[..., Any]  # the flow at a fixed time: whatever t has, its tangents do not count
+    slope: Callable[..., Any]  # only the tangents that flow fills, those of t left out
     flow: Callable[..., Any]
     margins: Callable[..., Any]
     normal: Callable[..., Any]
@@ -84,6 +84,7 @@ class TangentCourse:
     moving: int  # whether the tangents are at an instant that moves
     fresh: int  # whether an arc begins, of which no slope is known
     finite: int  # whether all tangents were finite where the arc began, and are
+    stage: int  # of the step of the run that they follow
     rows: int  # how many are kept
     fired: int
     next_time: int
@@ -132,6 +133,7 @@ class Traced(NamedTuple):
     method: Coefficients
     rtol: Vector
     every: list[int]  # whether all rows are kept
+    same: list[int]  # whether the run has the method of its tangents
     locks: list[int]  # whether locks determine components
     wide: list[int]  # number of directions
     course: TangentCourse
@@ -144,9 +146,32 @@ def rate_in_lanes(t: float, y: Vector, mode: list[int], held: Vector, on: Held, 
     if len(on.sliding.which) == 0 or on.sliding.count == 0:
         w = on.functions.p.lanes
         p = on.functions.p.functions.p
-        on.functions.p.tangents.rate(t, y, mode, held, p, dy, w.t, (w.shared, w.own))
+        on.functions.p.tangents.flow(t, y, mode, held, p, dy, w.t, (w.shared, w.own))
     else:
         slide_in_lanes(on, t, y, mode, dy)
+
+
+class Taken(NamedTuple):
+    """A step of a run that its tangents follow stage by stage."""
+
+    on: Held
+    scratch: Scratch
+
+
+def slope_in_lanes(
+    t: float, y: Vector, mode: list[int], held: Vector, step: Taken, dy: Vector
+) -> None:
+    """Fill the rates of tangents at the next stage of a step, whose own rates are known."""
+    traced: Any = step.on.functions.p
+    c, w, k = traced.course, traced.lanes, step.scratch.k
+    numbers = w.shared, w.own
+    traced.tangents.slope(t, y, mode, held, traced.functions.p, dy, w.t, numbers)
+    for j in range(len(c.y)):
+        if c.stage < len(k):
+            dy[j] = k[c.stage][j]
+        else:
+            dy[j] = step.scratch.f_new[j]
+    c.stage += 1
 
 
 def slide_in_lanes(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None:

@@ -16,6 +16,7 @@ from integrators.step_size import INFINITY, root_of
 from integrators.steps import (
     ArcMotion,
     Now,
+    Scratch,
     Vector,
     fit_dense,
     interpolate,
@@ -27,11 +28,13 @@ from integrators.switching.machines import Machines
 from integrators.tangents import switches
 from integrators.tangents.motion import (
     Lanes,
+    Taken,
     TangentCourse,
     Traced,
     groups_of,
     put_group,
     rate_in_lanes,
+    slope_in_lanes,
     take_group,
 )
 from integrators.tangents.switches import (
@@ -48,7 +51,7 @@ __all__ = ["machines_that_note"]
 
 SAFE, LEAST, MOST = 0.9, 0.2, 3.0  # of the step control
 ORDER = 5
-LOOSE = 30.0  # tolerances that a step of tangents may take
+LOOSE = 100.0  # tolerances that a step of tangents may take
 SHARE = 1e-3  # of the largest tangent that a component could have: what is small beside it
 ROUNDING = 2.0**-52
 SMALLEST = 1e-300
@@ -167,7 +170,7 @@ def _finish(own: Held, b: Buffers) -> None:
 
 
 # --------------------------------------------------------------------------- arcs
-def moved(t: float, now: Now, on: Held) -> None:
+def moved(t: float, now: Now, scratch: Scratch, whole: bool, on: Held) -> None:
     """Go on along a step; one of no length is of the instant before."""
     traced: Any = on.functions.p
     c = traced.course
@@ -178,11 +181,14 @@ def moved(t: float, now: Now, on: Held) -> None:
         _begin(own, now, on.sliding)
     for j in range(len(c.y)):
         c.sizes[j] = max(c.sizes[j], abs(now.y[j]))
+    sliding = len(on.sliding.which) > 0 and on.sliding.count > 0
+    alike = 1 if whole and not sliding else 0
+    step = Taken(own, scratch)
     first, finite = c.next_time, True
     for group in range(groups_of(traced)):
         take_group(traced, group, c.y)
         c.next_time = first
-        finite = _along(own, t, now.y, group) and finite
+        finite = _along(step, alike * traced.same[0], t, now.y, group) and finite
         put_group(traced, group)
     c.rows += traced.every[0] + c.next_time - first
     c.fresh = 0
@@ -198,14 +204,22 @@ def moved(t: float, now: Now, on: Held) -> None:
         c.y[j] = now.y[j]
 
 
-def _along(own: Held, end: float, y: Vector, group: int) -> bool:
-    """Integrate the lanes of a group to the end of a step; return whether they are finite there."""
+def _along(taken: Taken, alike: int, end: float, y: Vector, group: int) -> bool:
+    """Integrate the lanes of a group to the end of a step; return whether they are finite there.
+
+    Where that is short enough for them, and alike, its own stages are theirs.
+    """
+    own = taken.on
     traced: Any = own.functions.p
     c, w = traced.course, traced.lanes
     motion = ArcMotion(rate_in_lanes, margins_on, own, follow_on, moves_alone)
+    as_taken = ArcMotion(slope_in_lanes, margins_on, taken, follow_on, moves_alone)
     now, slope, size, place = w.now, c.slope[group], len(y), c.rows
     now.t = c.t
-    if c.fresh > 0:
+    c.stage = 0
+    if c.fresh > 0 and alike > 0:
+        slope_in_lanes(now.t, now.y, now.mode, now.held, taken, now.f)
+    elif c.fresh > 0:
         rate_in_lanes(now.t, now.y, now.mode, now.held, own, now.f)
     else:
         for k in range(len(slope)):
@@ -215,12 +229,17 @@ def _along(own: Held, end: float, y: Vector, group: int) -> bool:
         step = min(c.steps[group], end - now.t)
         t_new = end if end - now.t - step <= tick else now.t + step
         step = t_new - now.t
-        take_step(motion, traced.method, now, t_new, w.scratch)
+        whole = now.t == c.t and t_new == end
+        if alike > 0 and whole:
+            c.stage = 1
+            take_step(as_taken, traced.method, now, t_new, w.scratch)
+        else:
+            take_step(motion, traced.method, now, t_new, w.scratch)
         worst = _error(traced, step)
         if worst > LOOSE and step > tick:
             c.steps[group] = step * max(LEAST, SAFE / root_of(worst / LOOSE, ORDER))
         else:
-            if now.t == c.t and t_new == end:  # the steps of the run are short enough
+            if whole:  # the steps of the run are short enough
                 c.steps[group] = INFINITY
             else:
                 longer = step * min(MOST, SAFE / root_of(worst / LOOSE, ORDER))

@@ -1,6 +1,7 @@
 """Sensitivities are what differences of much more accurate runs tend to, through every switch.
 
-A difference of two runs has an error of its own: it is taken from how far two steps are apart.
+A difference of two runs has an error of its own: it is taken from how far two extrapolations are
+apart.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SignalError
 from gms_fsm.gradients.directions import Directions
-from gms_fsm.gradients.following import LANES, TangentRun, as_columns
+from gms_fsm.gradients.following import LANES, TABLEAU, TangentRun, as_columns
 from gms_fsm.gradients.sensitivities import Sensitivities
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
@@ -212,7 +212,7 @@ class Columns:
         log.stops_t, log.stops_microstep = stops_t, stops_microstep
         log.stops_y, log.stops_mode = stops_y, stops_mode
         if self.tangents:
-            self.tangents.place(self._traced, start.options.rtol)
+            self.tangents.place(self._traced)
         self.packed: tuple[Rows, ...] = ()  # those before the rows in the columns
         self.handed_out = False  # whether a trace has the columns of rows, and not a copy
         self._begin()
@@ -512,7 +512,8 @@ _known: dict[Any, compiled.ReadyCode] = {}
 def tangents_of(start: Problem, wanted: Directions) -> TangentRun:
     """Return what a run has besides its own numbers, if it is differentiated."""
     times = (start.last,) if start.output == "end" else start.options.times
-    return TangentRun(start.program, wanted, len(start.y), times, LANES if wanted.count > 1 else 1)
+    lanes, same = LANES if wanted.count > 1 else 1, start.options.method is TABLEAU
+    return TangentRun(start.program, wanted, len(start.y), times, lanes, start.options.rtol, same)
 
 
 def _prepared(
@@ -528,7 +529,7 @@ def _prepared(
             _known.clear()
         run = example_of(start, counting)._replace(more=following_of(start))
         if tangents is not None:
-            functions, machines = tangents.traced(run.functions, run.machines, 0.0, as_columns)
+            functions, machines = tangents.traced(run.functions, run.machines, as_columns)
             run = run._replace(functions=functions, machines=machines)
         engine = compiled.engine(program, run, counting, text)
         _known[key] = ready = compiled.ReadyCode(engine, run, program.functions)
