@@ -251,6 +251,18 @@ class TangentRun:
         groups = rows.reshape(len(rows), -1, self.lanes).transpose(1, 0, 2)
         return np.ascontiguousarray(groups.reshape(groups.shape[0], -1))
 
+    @functools.cached_property
+    def start(self) -> FloatArray:
+        """The tangents of the state at the start."""
+        start = np.zeros((self.size, self.wide))
+        start[:, : self.directions.count] = self.directions.y
+        return start
+
+    @functools.cached_property
+    def nothing(self) -> FloatArray:
+        """Tangents of what has not moved."""
+        return np.zeros(self.wide)
+
     # ------------------------------------------------------------------ a run
     def place(self, traced: Any) -> None:
         """Put the settings of a run, and columns of its own, into a block."""
@@ -264,14 +276,11 @@ class TangentRun:
         put_numbers(c, numbers_of(TangentCourse), (0,) * len(numbers_of(TangentCourse)))
         c.t = c.before = t
         c.settled, c.span, c.instant = -np.inf, t_end - t, 1
-        count = self.directions.count
-        whole, sizes = np.zeros((self.size, self.wide)), np.ones(self.wide)
-        whole[:, :count], sizes[:count] = self.directions.y, scales
         c.y[:], c.y_before[:], c.sizes[:] = y, y, np.abs(y)
-        for array, values in ((c.S, whole), (c.scales, sizes)):
+        sizes = np.append(scales, self.nothing[len(scales) :] + 1.0)
+        starts = (c.S, self.start), (c.scales, sizes), (c.t_t, self.nothing)
+        for array, values in (*starts, (c.t_before, self.nothing)):
             array[:] = values if isinstance(array, np.ndarray) else values.tolist()
-        for array in (c.t_t, c.t_before):
-            array[:] = [0.0] * self.wide
 
     def make_room(self, c: Any, rows: int, firings: int) -> None:
         """Lengthen the columns that have no room for so many more rows and firings."""

@@ -108,10 +108,10 @@ def engine(
         return compiled.engine(text, run, calls, store(), notify, more, stamp, bool(tangents))
 
 
-def with_more(engine: CompiledFunction) -> Library:
-    """Return the machine code of an engine with its further functions."""
+def with_more(engine: CompiledFunction, *, alone: bool = False) -> Library:
+    """Return the machine code of an engine with its further functions, or these alone."""
     with _lock:
-        return engine.extended
+        return engine.beside if alone else engine.extended
 
 
 def text_of(program: Program, more: str = "") -> str:

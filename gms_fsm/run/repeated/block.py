@@ -72,7 +72,7 @@ class RepeatedRun:
         self.floats = columns.block.words.view(float)
         self.first = columns.block.copy()
         call = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)
-        library = with_more(columns.engine)
+        library = with_more(columns.engine, alone=wanted is not None)
         self._adapt: Any = call(library.address("adapt"))
         if wanted is None:
             several = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, *[ctypes.c_int64] * 3)
