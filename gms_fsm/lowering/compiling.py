@@ -83,12 +83,16 @@ def plan_in_block(plan: Any, places: Any) -> Any:
 
 
 def engine(
-    program: Program, run: RecordArguments, counting: Counting | None = None, tangents: str = ""
+    program: Program,
+    run: RecordArguments,
+    counting: Counting | None = None,
+    tangents: str = "",
+    lanes: int = 0,
 ) -> CompiledFunction:
     """Return the loop of a program as machine code, which may count its rows, or have tangents.
 
     Its further functions `adapt` and `repeat` let everything follow from other numbers; with
-    tangents there is no `repeat`.
+    tangents there is no `repeat`. Their text says how they are computed, several side by side.
     """
     from integrators.runners import compiled
     from integrators.runners.repeating import repeat
@@ -105,7 +109,7 @@ def engine(
     with _lock:
         stamp = functools.partial(stamp_of, program.plan)
         calls = _calls(program)
-        return compiled.engine(text, run, calls, store(), notify, more, stamp, bool(tangents))
+        return compiled.engine(text, run, calls, store(), notify, more, stamp, lanes > 1)
 
 
 def with_more(engine: CompiledFunction, *, alone: bool = False) -> Library:

@@ -50,8 +50,8 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     returned = []
     machine = integrators.runners.compiled
 
-    def engine(program: Any, run: Any, counting: Any, tangents: str) -> Any:
-        assert not tangents
+    def engine(program: Any, run: Any, counting: Any, *tangents: Any) -> Any:
+        assert not any(tangents)
         inside = machine._longest(run) <= machine.LONGEST_INSIDE
         return SimpleNamespace(layout=BlockLayout(run, machine.is_known, inside=inside))
 

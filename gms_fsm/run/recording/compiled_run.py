@@ -522,7 +522,7 @@ def _prepared(
     """Return what a run has in common with others: what moves, the method, and the sizes."""
     program = start.program
     flow = "flow" if start.options.located else "flow_live"
-    text = "" if tangents is None else tangents.texts["text"]
+    text, lanes = ("", 0) if tangents is None else (tangents.texts["text"], tangents.lanes)
     key = id(program.functions), flow, start.options.method, counting is not None, text
     if (ready := _known.get(key)) is None:
         if len(_known) >= compiled.MOST_ENGINES:
@@ -531,7 +531,7 @@ def _prepared(
         if tangents is not None:
             functions, machines = tangents.traced(run.functions, run.machines, as_columns)
             run = run._replace(functions=functions, machines=machines)
-        engine = compiled.engine(program, run, counting, text)
+        engine = compiled.engine(program, run, counting, text, lanes)
         _known[key] = ready = compiled.ReadyCode(engine, run, program.functions)
     return ready
 
