@@ -15,7 +15,7 @@ from gms_fsm.foundation.arguments import unknown
 from gms_fsm.gradients.tangents import ActiveNumbers
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.mounted import Mounted
-from gms_fsm.systems.numbers import column_name, label_in, number_of
+from gms_fsm.systems.numbers import column_name, label_in, number_in, numbers_of
 
 INITIAL = "initial."
 
@@ -77,7 +77,7 @@ def directions_of(
         raise ParameterError("it names nothing", place="sensitivities", value=names)
     if len({*given}) < len(given):
         raise ParameterError("a name stands there twice", place="sensitivities", value=given)
-    shared, own = program.plan.names.shared, program.plan.names.own
+    shared, own, numbers = program.plan.names.shared, program.plan.names.own, numbers_of(what)
     start = np.zeros((len(y), len(given)))
     changes: dict[int, np.ndarray] = {}
     rows: dict[int, np.ndarray] = {}
@@ -86,7 +86,7 @@ def directions_of(
             places = initial_places(program, name, "sensitivities")
             start[places, c] = 1.0
             continue
-        number = number_of(what, name)
+        number = number_in(numbers, name)
         label = label_in(what, number.whole)
         place = shared.index(label) if label in shared else -1
         read = f"shared[{place}]" in program.source

@@ -359,13 +359,18 @@ def as_columns(array: Any) -> Any:
 
 
 def _lengthen(c: Any, needed: int, *names: str) -> None:
-    """Double columns until they are long enough."""
+    """Make columns long enough, and at least twice as long as they are."""
     for name in names:
-        while len(column := getattr(c, name)) < needed:
-            if isinstance(column, list):
-                column += copy.deepcopy(column)
-            else:
-                setattr(c, name, np.concatenate([column, np.zeros_like(column)]))
+        column = getattr(c, name)
+        if (length := len(column)) >= needed:
+            continue
+        more = max(needed - length, length)
+        if isinstance(column, list):
+            column += [copy.copy(column[0]) for _ in range(more)]
+        else:
+            setattr(
+                c, name, np.concatenate([column, np.zeros((more, *column.shape[1:]), column.dtype)])
+            )
 
 
 SLIDE_ENDS = "the end of a slide"

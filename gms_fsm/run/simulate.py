@@ -241,7 +241,7 @@ def derived(run: CompiledRun | Run, directions: Directions) -> Sensitivities:
     """Return the derivatives of a run that has reached its end: those followed, or once more.
 
     Python follows tangents only where nothing else can: a run once more in machine code takes a
-    hundredth of the time.
+    tenth of the time.
     """
     followed = run.columns.derived() if isinstance(run, CompiledRun) else None
     if followed is None:
