@@ -44,7 +44,7 @@ def test_they_are_as_near_as_the_run_itself():
         _, found = compared(run, names_of(run, FEW), rtol)
         assert max(each.late for each in found) < 1e-7
         errors.append(max(each.error for each in found))
-    assert 1e-6 < errors[0] < 2e-5
+    assert 1e-6 < errors[0] < 3e-5
     assert errors[1] < 0.2 * errors[0]
     assert errors[2] < 0.3 * errors[1]
 
@@ -69,13 +69,16 @@ def test_rows_and_the_log_keep_their_bits(name: str, kept: str):
     assert len(with_them.derived.followed.times) == len(without.firings)
 
 
-@pytest.mark.parametrize(("name", "part"), [("system servo", 0.1), ("sliding", 1.0)])
+@pytest.mark.parametrize(
+    ("name", "part", "most"),
+    [("system servo", 0.1, 5), ("sliding", 1.0, 5), ("pulled mass", 0.1, 0)],
+)
 def test_they_have_equal_bits_in_all_engines(
-    name: str, part: float, monkeypatch: pytest.MonkeyPatch
+    name: str, part: float, most: int, monkeypatch: pytest.MonkeyPatch
 ):
     pytest.importorskip("llvmlite")
     run = replace(corpus.run(name), t_end=part * corpus.run(name).t_end)
-    names = names_of(run, 5)  # more than stand in lanes
+    names = names_of(run, most)  # more than stand in lanes, or one
     compiled = run(engine="compiled", sensitivities=names).derived.followed
     monkeypatch.setattr(runs, "has_machine_code", lambda: False)
     text = run(engine="ifelse", sensitivities=names).derived.followed
