@@ -151,7 +151,7 @@ def rate_in_lanes(t: float, y: Vector, mode: list[int], held: Vector, on: Held, 
         slide_in_lanes(on, t, y, mode, dy)
 
 
-class Taken(NamedTuple):
+class TakenStep(NamedTuple):
     """A step of a run that its tangents follow stage by stage."""
 
     on: Held
@@ -159,7 +159,7 @@ class Taken(NamedTuple):
 
 
 def slope_in_lanes(
-    t: float, y: Vector, mode: list[int], held: Vector, step: Taken, dy: Vector
+    t: float, y: Vector, mode: list[int], held: Vector, step: TakenStep, dy: Vector
 ) -> None:
     """Fill the rates of tangents at the next stage of a step, whose own rates are known."""
     traced: Any = step.on.functions.p

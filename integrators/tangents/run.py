@@ -28,7 +28,7 @@ from integrators.switching.machines import Machines
 from integrators.tangents import switches
 from integrators.tangents.motion import (
     Lanes,
-    Taken,
+    TakenStep,
     TangentCourse,
     Traced,
     groups_of,
@@ -183,7 +183,7 @@ def moved(t: float, now: Now, scratch: Scratch, whole: bool, on: Held) -> None:
         c.sizes[j] = max(c.sizes[j], abs(now.y[j]))
     sliding = len(on.sliding.which) > 0 and on.sliding.count > 0
     alike = 1 if whole and not sliding else 0
-    step = Taken(own, scratch)
+    step = TakenStep(own, scratch)
     first, finite = c.next_time, True
     for group in range(groups_of(traced)):
         take_group(traced, group, c.y)
@@ -204,7 +204,7 @@ def moved(t: float, now: Now, scratch: Scratch, whole: bool, on: Held) -> None:
         c.y[j] = now.y[j]
 
 
-def _along(taken: Taken, alike: int, end: float, y: Vector, group: int) -> bool:
+def _along(taken: TakenStep, alike: int, end: float, y: Vector, group: int) -> bool:
     """Integrate the lanes of a group to the end of a step; return whether they are finite there.
 
     Where that is short enough for them, and alike, its own stages are theirs.
