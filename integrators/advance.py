@@ -276,6 +276,7 @@ def advance(
                 y[j] = y_new[j]
                 f[j] = f_new[j]
         motion.follow(min(t_new, seen), y, now.mode, now.held, motion.p)
+        motion.moved(min(t_new, seen), now, scratch, theta >= 1.0 and t_new <= seen, motion.p)
         now.t = t_new
         if scaleless:
             raise_floor(plan.control, now)

@@ -56,15 +56,6 @@ def stays(t: float, y: Vector, mode: list[int], held: Vector, p: Any) -> None:
     """Set no component: none is determined by others."""
 
 
-class ArcMotion(NamedTuple):
-    """The flow on an arc, what is watched, and what follows, with the parameters of all."""
-
-    flow: Flow
-    margins: Margins
-    p: Any
-    follow: Follow
-
-
 @dataclass(slots=True, eq=False)
 class Now:
     """The state of a run; changed in place."""
@@ -87,11 +78,6 @@ class Now:
     floor: Vector  # absolute tolerances, shape (m,); they grow for components without a scale
 
 
-def time_of(now: Now) -> float:
-    """Return the time at which the system shows the state: one clock tick before a jump."""
-    return min(now.t, now.seen)
-
-
 class Scratch(NamedTuple):
     """The attempted step."""
 
@@ -100,6 +86,26 @@ class Scratch(NamedTuple):
     f_new: Vector
     error: Vector
     dense: Dense
+
+
+def moves_alone(t: float, now: Now, scratch: Scratch, whole: bool, p: Any) -> None:
+    """Go on: nothing moves with the state."""
+
+
+class ArcMotion(NamedTuple):
+    """The flow on an arc, what is watched, and what follows, with the parameters of all."""
+
+    flow: Flow
+    margins: Margins
+    p: Any
+    follow: Follow
+    # moved(t, now, scratch, whole, p) once y is at t, with now.t before it; whether by a whole step
+    moved: Callable[..., Any] = moves_alone
+
+
+def time_of(now: Now) -> float:
+    """Return the time at which the system shows the state: one clock tick before a jump."""
+    return min(now.t, now.seen)
 
 
 def coefficients(tableau: Tableau) -> Coefficients:

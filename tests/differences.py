@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,8 @@ from gms_fsm.systems.numbers import number_of, numbers_of, with_numbers
 from tests.corpus import Run
 from tests.helpers import FASTEST
 
-STEPS = (1e-2, 1e-3, 1e-4, 1e-5)  # of the number itself
+RATIO = 4.0  # of one step to the next
+STEPS = tuple(1e-2 * RATIO**-k for k in range(6))  # of the number itself
 SMALL = 1e-2  # of the natural size of a derivative: below it errors are absolute
 
 
@@ -32,7 +34,9 @@ class Compared:
         By what.
     error, noise : float
         Of the worst component of the final state and the times of all switches, relative to it; and
-        how far apart the differences of two steps are, in the worst component of theirs.
+        how far apart two extrapolations of differences are, in the worst component of theirs.
+    late : float
+        Error of the worst time of a switch.
     known : bool
         Whether the derivative is a number, and there are differences: the same switches on both
         sides.
@@ -41,6 +45,7 @@ class Compared:
     name: str
     error: float
     noise: float
+    late: float
     known: bool
 
 
@@ -79,7 +84,7 @@ def _one(run: Run, trace: Trace, c: int, name: str) -> Compared:
     followed = trace.derived.followed
     got = np.concatenate([followed.end[:, c], followed.times[:, c]])
     size = _size(run, name)
-    found, steps = [], []
+    found = []
     for step in STEPS:
         try:
             up, down = (_end(run, trace, name, sign * step * size) for sign in (1.0, -1.0))
@@ -87,18 +92,20 @@ def _one(run: Run, trace: Trace, c: int, name: str) -> Compared:
             continue
         if up is not None and down is not None:
             found.append((up - down) / (2.0 * step * size))
-            steps.append(step)
     if len(found) < 3 or np.isnan(got).any():
-        return Compared(name, np.inf, np.inf, known=False)
-    table, ratio = np.array(found), (np.array(steps[:-1]) / steps[1:])[:, None] ** 2
-    without_squares = table[1:] + np.diff(table, axis=0) / (ratio - 1.0)
+        return Compared(name, np.inf, np.inf, np.inf, known=False)
     natural = [np.abs(trace.rows.y).max(axis=0), np.full(len(trace.firings), run.t_end)]
-    scale = np.maximum(np.abs(without_squares[-1]), SMALL * np.concatenate(natural) / size + 1e-300)
+    scale = np.maximum(np.abs(found[-1]), SMALL * np.concatenate(natural) / size + 1e-300)
     # Two noisy ones may agree by chance in one component, not in all of them.
-    apart = (np.abs(np.diff(without_squares, axis=0)) / scale).max(axis=1)
-    best = int(np.argmin(apart))
-    error = (np.abs(got - without_squares[best + 1]) / scale).max()
-    return Compared(name, float(error), float(apart[best]), known=True)
+    noise, best = np.inf, found[-1]
+    for order in range(1, len(found)):  # Richardson: without squares, then fourth powers, ...
+        found = [v + (v - u) / (RATIO ** (2 * order) - 1.0) for u, v in pairwise(found)]
+        for u, v in pairwise(found):
+            apart = float((np.abs(v - u) / scale).max())
+            noise, best = (apart, v) if apart < noise else (noise, best)
+    error = np.abs(got - best) / scale
+    late = error[trace.rows.y.shape[1] :].max(initial=0.0)
+    return Compared(name, float(error.max()), noise, float(late), known=True)
 
 
 def _size(run: Run, name: str) -> float:

@@ -16,12 +16,12 @@ from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ExpressionError, ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing
 from gms_fsm.foundation.extras import has_machine_code
-from gms_fsm.gradients.directions import INITIAL
-from gms_fsm.gradients.linear import Directions, Linear
+from gms_fsm.gradients.directions import INITIAL, Directions
+from gms_fsm.gradients.linear import Linear
 from gms_fsm.lowering.observing import armed
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.run.simulate import check_derivable, derived, simulated
+from gms_fsm.run.simulate import check_derivable, simulated
 from gms_fsm.run.ticks import clocks_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted, mounted
@@ -261,14 +261,15 @@ class _Search:
         for iteration in range(1, MOST_ITERATIONS + 1):
             start = self.problem(y, period)
             try:
-                trace = simulated(start)
+                trace = simulated(start, wanted=every)
             except SimulationError:
                 if back is None:
                     raise
                 y, period = y + back[0], period + back[1]
                 back = 0.5 * back[0], 0.5 * back[1]
                 continue
-            M = derived(start, every, len(trace.rows)).followed.end
+            assert trace.derived is not None
+            M, trace = trace.derived.followed.end, replace(trace, derived=None)
             end = np.array(trace.rows.y[-1])
             moved = np.zeros(size) if drift is None else drift * period
             R = Q.T @ ((end - y - moved) / self.sizes)

@@ -3,19 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import unknown
-from gms_fsm.gradients.linear import Directions
+from gms_fsm.gradients.tangents import ActiveNumbers
 from gms_fsm.lowering.program import Program
 from gms_fsm.systems.mounted import Mounted
-from gms_fsm.systems.numbers import column_name, label_in, number_of
+from gms_fsm.systems.numbers import column_name, label_in, number_in, numbers_of
 
 INITIAL = "initial."
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Directions in which the numbers and the initial state change.
+
+    Parameters
+    ----------
+    names : tuple of str
+        As the user gave them.
+    shared, own : mapping
+        For each number that changes, by its place, what it changes by in each direction: shape
+        (directions,), or (elements, directions).
+    y : ndarray, shape (m, directions)
+        Change of the initial state.
+    scales : ndarray, shape (directions,)
+        How much a number changes at most, for tolerances.
+    """
+
+    names: tuple[str, ...]
+    shared: dict[int, FloatArray]
+    own: dict[int, FloatArray]
+    y: FloatArray
+    scales: FloatArray
+
+    @cached_property
+    def places(self) -> ActiveNumbers:
+        """Which numbers change."""
+        return ActiveNumbers(frozenset(self.shared), frozenset(self.own))
+
+    @cached_property
+    def moves(self) -> FloatArray:
+        """What the state changes by, then each shared number, then those of the elements."""
+        rows = [self.y, *(row[None] for row in self.shared.values()), *self.own.values()]
+        return np.concatenate(rows)
+
+    @property
+    def count(self) -> int:
+        """Number of directions."""
+        return len(self.names)
 
 
 def directions_of(
@@ -35,7 +77,7 @@ def directions_of(
         raise ParameterError("it names nothing", place="sensitivities", value=names)
     if len({*given}) < len(given):
         raise ParameterError("a name stands there twice", place="sensitivities", value=given)
-    shared, own = program.plan.names.shared, program.plan.names.own
+    shared, own, numbers = program.plan.names.shared, program.plan.names.own, numbers_of(what)
     start = np.zeros((len(y), len(given)))
     changes: dict[int, np.ndarray] = {}
     rows: dict[int, np.ndarray] = {}
@@ -44,7 +86,7 @@ def directions_of(
             places = initial_places(program, name, "sensitivities")
             start[places, c] = 1.0
             continue
-        number = number_of(what, name)
+        number = number_in(numbers, name)
         label = label_in(what, number.whole)
         place = shared.index(label) if label in shared else -1
         read = f"shared[{place}]" in program.source
@@ -63,17 +105,17 @@ def directions_of(
         table = rows.setdefault(k, np.zeros((len(program.p[1][k]), len(given))))
         table[slice(None) if number.element is None else number.element, c] = 1.0
     made = Directions(given, changes, rows, start, np.ones(len(given)))
-    return replace(made, scales=scales_of(made, program, y))
+    return replace(made, scales=scales_of(made, program.p, y))
 
 
-def scales_of(directions: Directions, program: Program, y: list[float]) -> FloatArray:
+def scales_of(directions: Directions, p: Any, y: Any) -> FloatArray:
     """Return how large what changes in each direction is; 1 if it is 0."""
-    scales = np.zeros(directions.count)
-    parts = [(directions.y, np.array(y))]
-    parts += [(row[None], np.array([program.p[0][k]])) for k, row in directions.shared.items()]
-    parts += [(rows, np.array(program.p[1][k])) for k, rows in directions.own.items()]
-    for moves, values in parts:
-        scales = np.maximum(scales, np.abs(moves * values[:, None]).max(axis=0, initial=0.0))
+    shared, own, _ = p
+    values = [y, [shared[k] for k in directions.shared]]
+    values += [own[k][: len(rows)] for k, rows in directions.own.items()]
+    scales: FloatArray = np.abs(directions.moves * np.concatenate(values)[:, None]).max(
+        axis=0, initial=0.0
+    )
     scales[scales == 0.0] = 1.0
     return scales
 

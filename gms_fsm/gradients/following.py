@@ -1,7 +1,6 @@
-"""The tangents of a run: the loop of `integrators.tangents` on the functions of a program.
+"""The tangents of a run: what the loop of `integrators.tangents` needs of a program.
 
-It is machine code wherever that is installed, whatever engine the run itself has: the bits are the
-same without it.
+They follow the loop in machine code, and in Python where that is not installed, with equal bits.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,25 +16,34 @@ import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.equality import ByIdentity
-from gms_fsm.foundation.extras import has_machine_code
-from gms_fsm.gradients.linear import Directions
-from gms_fsm.gradients.tangents import in_lanes, refuse_callables
+from gms_fsm.gradients.directions import Directions
+from gms_fsm.gradients.tangents import in_lanes
 from gms_fsm.language import comparisons, split
-from gms_fsm.lowering import compiling
-from gms_fsm.lowering.program import Program, equations
-from integrators import METHODS, Functions, Held, LoopOptions, Tableau, hybrid, sliding_scratch
-from integrators.loop import ADVANCE, DONE, ROWS, Machines
-from integrators.machine_code.records import arrays_of, numbers_in, numbers_of, put_numbers
-from integrators.runners.states import begin
-from integrators.steps import Dense, Now, Scratch, coefficients
+from gms_fsm.lowering.program import Program, equations, machines_of
+from integrators import METHODS, Functions, Held, LoopOptions, hybrid, sliding_scratch
+from integrators.loop import (
+    ADVANCE,
+    DONE,
+    FIRED,
+    FIRING,
+    ROWS,
+    SLID,
+    STOPPED,
+    Machines,
+    run_to_event,
+)
+from integrators.machine_code.records import numbers_of, put_numbers
+from integrators.sliding import MOST_SLIDING, flow_on, follow_on, margins_on
+from integrators.steps import ArcMotion, Dense, Now, Scratch, coefficients
 from integrators.tangents import switches
 from integrators.tangents.motion import LaneFunctions, Lanes, SlideLanes, TangentCourse, Traced
-from integrators.tangents.run import FollowArguments, follow_run
+from integrators.tangents.run import machines_that_note
 
-METHOD = coefficients(METHODS["dp45"])
-LANES = 4  # directions side by side, where there are several
+TABLEAU = METHODS["dp45"]
+METHOD = coefficients(TABLEAU)
+LANES = 4  # where there are several directions
 ROWS_AT_ONCE = 256
-STEPS_AT_ONCE = 20_000
+FEW = 16  # first length of columns that grow
 
 
 @dataclass(frozen=True)
@@ -85,115 +93,118 @@ class Followed:
     doubts: tuple[DerivativeDoubt, ...]
 
 
-def follow(
-    program: Program,
-    options: LoopOptions,
-    start: tuple[float, list[float], list[int], float],
-    directions: Directions,
-    rows: int = 4 * ROWS_AT_ONCE,
-) -> Followed:
-    """Differentiate a run of about so many rows."""
-    refuse_callables(program)
-    inside = has_machine_code() and isinstance(options.method, Tableau)
-    run = _TangentRun(program, options, start, directions, inside, rows)
-    return run.to_its_end(run.in_block() if inside else run.in_lists())
+@dataclass(frozen=True, eq=False)
+class TangentRun:
+    """What a run has besides its own numbers, if tangents follow it.
 
+    Parameters
+    ----------
+    program : Program
+        What is run.
+    directions : Directions
+        By what it is differentiated.
+    size : int
+        Length of the state.
+    times : sequence of float, optional
+        Of the rows at which tangents are wanted, if not at all rows.
+    lanes : int
+        How many directions stand side by side.
+    rtol : float
+        The tolerance.
+    same : bool
+        Whether the run has the method of its tangents.
+    """
 
-class _TangentRun:
-    """A run with tangents, as arrays or as lists."""
+    program: Program
+    directions: Directions
+    size: int
+    times: Sequence[float] | Any | None
+    lanes: int
+    rtol: float = 0.0
+    same: bool = False
 
-    def __init__(
-        self,
-        program: Program,
-        options: LoopOptions,
-        start: tuple[float, list[float], list[int], float],
-        directions: Directions,
-        compiled: bool,
-        rows: int,
-    ) -> None:
-        self.program, self.directions, self.compiled = program, directions, compiled
-        self.start, self.wanted = start, options.times
-        self.options = dataclasses.replace(options, times=None)
-        self.rows = rows + ROWS_AT_ONCE + 3 if self.wanted is None else len(self.wanted)
-        self.lanes = LANES if directions.count > 1 else 1
-        self.wide = (directions.count // self.lanes + 1) * self.lanes  # the time has a place, too
-        size, title = len(start[1]), program.plan.title
-        self.tangents = in_lanes(program.source, title, directions.places, self.lanes, size)
-        self.texts: Any = compiling.functions(program) if compiled else program.ieee
+    @functools.cached_property
+    def wide(self) -> int:
+        """How many directions there are; the time has a place, too, and the last group is full."""
+        return (self.directions.count // self.lanes + 1) * self.lanes
+
+    @functools.cached_property
+    def texts(self) -> Mapping[str, Any]:
+        """The functions with tangents."""
+        program = self.program
+        places = self.directions.places
+        return in_lanes(program.source, program.plan.title, places, self.lanes, self.size)
 
     # ------------------------------------------------------------------ arguments
-    def arguments(self, outside: Callable[[Any], Any]) -> FollowArguments:
-        """Return the arguments, with something in place of arrays of any length."""
-        program, (t, y, mode, last), made = self.program, self.start, self.texts
-        tangents = self.tangents["plain"] if self.compiled else self.tangents
-        shared, own, tables = compiling.packed(program.p)
-        p = (shared.tolist(), own.tolist(), outside(tables)) if self.compiled else program.p
-        numbers = Functions(
-            made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p
-        )
-        machines = [made[name] for name in ("switch", "act", "tick", "jolts", "observe")]
-        b = hybrid.buffers(equations(program), t, y, mode, last, self.options, ROWS_AT_ONCE)
-        relations, plan = len(b.relations.watch), b.plan
-        columns = {name: outside(np.array(getattr(plan, name), float)) for name in _FLOATS}
-        b = b._replace(plan=plan._replace(**columns, ticks=outside(np.array(plan.ticks, int))))
-        b.out.times, b.out.rows_t, b.out.rows_y = (
-            outside(np.array(each, float)) for each in ([], b.out.rows_t, b.out.rows_y)
-        )
+    def traced(
+        self, functions: Functions, machines: Machines, outside: Callable[[Any], Any]
+    ) -> tuple[Functions, Machines]:
+        """Return functions and machines whose tangents are followed.
+
+        Arrays of any length are put into something else; with it, functions are those that are
+        translated.
+        """
+        program, tangents = self.program, self.texts
+        plain = outside is not as_lists
+        relations = len(program.strict) + 2 * min(len(program.surfaces.sign), MOST_SLIDING)
+        of_lanes = tangents["plain"] if plain else tangents
         traced = Traced(
-            numbers,
-            Machines(*machines),
-            LaneFunctions(*(tangents[name] for name in LaneFunctions._fields)),
+            functions,
+            machines,
+            LaneFunctions(*(of_lanes[name] for name in LaneFunctions._fields)),
             METHOD,
-            [self.options.rtol],
-            [int(self.wanted is None)],
+            [self.rtol],
+            [int(self.times is None)],
+            [int(self.same)],
             [program.velocities],
             [self.directions.count],
-            self.course(relations, outside),
-            self.scratch(relations),
+            self._course(relations, outside),
+            self._scratch(relations),
         )
-        noting = switches.ask, switches.act, switches.tick, switches.jolts, machines[-1]
-        return FollowArguments(switches.functions_of(traced), Machines(*noting), b)
+        return switches.functions_of(traced), machines_that_note()
 
-    def course(self, relations: int, outside: Callable[[Any], Any]) -> TangentCourse:
-        """Return the tangents at the start."""
-        program, (t, y, _, last), count = self.program, self.start, self.directions.count
-        size, wide, n = len(y), self.wide, program.layout.n
-        S, scales = np.zeros((size, wide)), np.ones(wide)
-        S[:, :count], scales[:count] = self.directions.y, self.directions.scales
+    def _course(self, relations: int, outside: Callable[[Any], Any]) -> TangentCourse:
+        """Return a course that has not begun."""
+        program, size = self.program, self.size
         guards, first_guards = _guards(ByIdentity(program.plan), ByIdentity(program.layout))
-
-        def floats(*shape: int) -> Any:
-            return outside(np.zeros(shape))
-
-        def places(length: int) -> Any:
-            return outside(np.zeros(length, dtype=np.int64))
-
+        numbers: Any = {
+            name: 0.0 if kind == "f" else 0 for name, kind in numbers_of(TangentCourse).items()
+        }
         return TangentCourse(
-            t=t, before=t, settled=-np.inf, span=last - t, instant=1, changed=0, moving=0,
-            rows=0, fired=0, next_time=0, doubts=0, named=0,
-            y=list(y), y_before=list(y), mode=[0] * n, held=[0.0] * program.held,
-            f=[0.0] * size, sizes=[abs(u) for u in y],
+            **numbers,
+            y=[0.0] * size, y_before=[0.0] * size, mode=[0] * program.layout.n,
+            held=[0.0] * program.held, f=[0.0] * size, sizes=[0.0] * size,
             watch=[0] * relations, only=[0] * relations, armed=[0] * relations,
             margins=[0.0] * relations, rates=[0.0] * relations,
-            guards=guards, first_guards=first_guards, sliding=self.sliding(relations),
-            S=outside(S), t_t=floats(wide), t_before=floats(wide),
-            slopes=floats(relations, wide), moves=outside(self.moves()), scales=outside(scales),
-            times=outside(np.array(() if self.wanted is None else self.wanted, float)),
-            rows_t=floats(self.rows), table=floats(self.rows, size * wide),
-            firings=floats(64, wide), doubt_t=floats(16), doubt_kind=places(16),
-            doubt_end=places(16), doubt_names=places(16 * (relations + 1)),
+            guards=guards, first_guards=first_guards, sliding=self._sliding(relations),
+            **{name: outside(each) for name, each in self._columns(relations).items()},
         )  # fmt: skip
 
-    def sliding(self, relations: int) -> Any:
-        """Return scratch space for sliding."""
-        program, size = self.program, len(self.start[1])
-        return sliding_scratch(program.surfaces, size, program.held, relations, 0)
+    def _columns(self, relations: int) -> dict[str, Any]:
+        """Return the arrays of any length, as they are at first."""
+        size, wide, groups = self.size, self.wide, self.wide // self.lanes
+        times = np.array(() if self.times is None else self.times, float)
+        shapes = {
+            "S": (size, wide), "t_t": (wide,), "t_before": (wide,), "scales": (wide,),
+            "slopes": (relations, wide), "slope": (groups, size * (1 + self.lanes)),
+            "steps": (groups,), "firings": (FEW, wide), "doubt_t": (FEW,),
+            "rows_t": (max(len(times), 1),), "table": (max(len(times), 1), size * wide),
+        }  # fmt: skip
+        lengths = {"doubt_kind": FEW, "doubt_end": FEW, "doubt_names": FEW * (relations + 1)}
+        found: dict[str, Any] = {name: np.zeros(shape) for name, shape in shapes.items()}
+        found |= {name: np.zeros(each, dtype=np.int64) for name, each in lengths.items()}
+        return {**found, "moves": self.moves, "times": times}
 
-    def scratch(self, relations: int) -> Lanes:
+    def _sliding(self, relations: int) -> Any:
+        """Return scratch space for sliding."""
+        program = self.program
+        return sliding_scratch(program.surfaces, self.size, program.held, relations, 0)
+
+    def _scratch(self, relations: int) -> Lanes:
         """Return the lanes of a group."""
         program, lanes, (shared, own, _) = self.program, self.lanes, self.program.p
-        size, longest = len(self.start[1]), max(map(len, own), default=0)
-        both, most = size * (1 + lanes), len(self.sliding(relations).sigma)
+        size, longest = self.size, max(map(len, own), default=0)
+        both, most = size * (1 + lanes), len(self._sliding(relations).sigma)
         alone, wide = (size, both) if most else (0, 0)
 
         def vector(length: int = both) -> list[float]:
@@ -226,8 +237,9 @@ class _TangentRun:
             ),
         )  # fmt: skip
 
+    @functools.cached_property
     def moves(self) -> FloatArray:
-        """Return what all numbers change by, lanes of each group."""
+        """What all numbers change by, lanes of each group."""
         d, (shared, own, _) = self.directions, self.program.p
         longest = max(map(len, own), default=0)
         rows = np.zeros((len(shared) + len(own) * longest, self.wide))
@@ -239,115 +251,126 @@ class _TangentRun:
         groups = rows.reshape(len(rows), -1, self.lanes).transpose(1, 0, 2)
         return np.ascontiguousarray(groups.reshape(groups.shape[0], -1))
 
-    # ------------------------------------------------------------------ how it is run
-    def in_lists(self) -> _TangentCall:
-        """Return what goes on in Python."""
-        arguments, solver = self.arguments(lambda array: array.tolist()), None
-        b = arguments.buffers
-        if b.plan.foreign:
-            from integrators.runners.scipy_arcs import SciPyStepper
+    @functools.cached_property
+    def start(self) -> FloatArray:
+        """The tangents of the state at the start."""
+        start = np.zeros((self.size, self.wide))
+        start[:, : self.directions.count] = self.directions.y
+        return start
 
-            solver = SciPyStepper(Held(arguments.functions, b.now.held, b.sliding), b, self.options)
+    @functools.cached_property
+    def nothing(self) -> FloatArray:
+        """Tangents of what has not moved."""
+        return np.zeros(self.wide)
 
-        def call() -> int:
-            event = follow_run(*arguments, STEPS_AT_ONCE)
-            if event == ADVANCE and solver is not None:
-                solver.advance(ROWS_AT_ONCE)
-                event = ROWS
-            return event
+    # ------------------------------------------------------------------ a run
+    def place(self, traced: Any) -> None:
+        """Put the settings of a run, and columns of its own, into a block."""
+        traced.rtol[0], traced.every[0] = self.rtol, int(self.times is None)
+        traced.wide[0], traced.same[0] = self.directions.count, int(self.same)
+        for name, column in self._columns(len(traced.course.watch)).items():
+            setattr(traced.course, name, column)
 
-        course = arguments.functions.p.course
-        return _TangentCall(call, course, course)
+    def begin(self, c: Any, t: float, y: Sequence[float], t_end: float, scales: FloatArray) -> None:
+        """Put the start of a run into a course, whose columns stay."""
+        put_numbers(c, numbers_of(TangentCourse), (0,) * len(numbers_of(TangentCourse)))
+        c.t = c.before = t
+        c.settled, c.span, c.instant = -np.inf, t_end - t, 1
+        c.y[:], c.y_before[:], c.sizes[:] = y, y, np.abs(y)
+        sizes = np.append(scales, self.nothing[len(scales) :] + 1.0)
+        starts = (c.S, self.start), (c.scales, sizes), (c.t_t, self.nothing)
+        for array, values in (*starts, (c.t_before, self.nothing)):
+            array[:] = values if isinstance(array, np.ndarray) else values.tolist()
 
-    def in_block(self) -> _TangentCall:
-        """Return what goes on in machine code."""
-        ready = self.ready()
-        block = ready.block()
-        contents = self.put(block.contents)
+    def make_room(self, c: Any, rows: int, firings: int) -> None:
+        """Lengthen the columns that have no room for so many more rows and firings."""
+        relations = len(c.watch)
+        _lengthen(c, c.rows + rows if self.times is None else 0, "rows_t", "table")
+        _lengthen(c, c.fired + firings, "firings")
+        _lengthen(c, c.doubts + 4, "doubt_t", "doubt_kind", "doubt_end")
+        _lengthen(c, c.named + 3 * relations + 1, "doubt_names")
 
-        def call() -> int:
-            block.update(contents)
-            return ready.engine(block, STEPS_AT_ONCE)
-
-        course = contents.functions.p.course
-        return _TangentCall(call, course, course, lambda: ready.take_back(block))
-
-    def put(self, contents: Any) -> Any:
-        """Put the numbers of this run into a block."""
-        program, options, (t, y, mode, last) = self.program, self.options, self.start
-        shared, own, tables = compiling.packed(program.p)
-        traced, b = contents.functions.p, contents.buffers
-        numbers = traced.functions
-        numbers.p[0][...], numbers.p[1][...] = shared, own
-        traced.rtol[0], traced.every[0] = options.rtol, self.wanted is None
-        traced.wide[0] = self.directions.count
-        plan = hybrid.plan_of(equations(program), t, last, options, len(mode))
-        b = b._replace(plan=compiling.plan_in_block(plan, b.plan))
-        begin(b, t, y, mode, last, options.floor or options.atol)
-        b.out.rows_t, b.out.rows_y = np.zeros(ROWS_AT_ONCE), np.zeros((ROWS_AT_ONCE, len(y)))
-        course = self.course(len(traced.course.watch), lambda array: array)
-        put_numbers(traced.course, counts := numbers_of(TangentCourse), numbers_in(course, counts))
-        for name in arrays_of(TangentCourse):
-            value = getattr(course, name)
-            if isinstance(value, np.ndarray):
-                setattr(traced.course, name, value)
-            elif name in ("y", "y_before", "sizes"):
-                getattr(traced.course, name)[:] = value
-        numbers = numbers._replace(p=(*numbers.p[:2], tables))
-        functions = contents.functions._replace(p=traced._replace(functions=numbers))
-        return contents._replace(functions=functions, buffers=b)
-
-    def ready(self) -> compiling.ReadyCode:
-        """Return machine code for all runs that differ in numbers only."""
-        from integrators.machine_code.layout import OuterArray
-        from integrators.runners import compiled
-
-        program, text = self.program, self.tangents["text"]
-        lengths = len(program.p[0]), *map(len, program.p[1])
-        key = program.source, text, lengths, self.options.method
-        if key not in _KEPT:
-            if len(_KEPT) >= compiling.MOST_ENGINES:
-                _KEPT.clear()
-
-            def column(array: Any) -> Any:
-                return OuterArray(array.dtype.kind, table=array.ndim == 2)
-
-            example = self.arguments(column)
-            text = compiling.text_of(program, text)
-            made = compiled.follower(text, example, compiling.store(), compiling.notify)
-            _KEPT[key] = compiling.ReadyCode(made, example, program.functions)
-        found: compiling.ReadyCode = _KEPT[key]
-        return found
-
-    def to_its_end(self, call: _TangentCall) -> Followed:
-        """Go on to the end, and return what has been kept."""
-        c = call.course
-        while (event := call.on()) != DONE:
-            if event != ROWS:
-                raise RuntimeError(f"a run has ended otherwise than before: {event}")
-            call.make_room()
-        count, arrays, size = self.directions.count, call.arrays, len(self.start[1])
-        table = np.asarray(arrays.table, float)[: c.rows].reshape(c.rows, size, self.wide)
-        firings = np.asarray(arrays.firings, float)[: c.fired].reshape(c.fired, self.wide)
-        found = Followed(
-            np.asarray(arrays.rows_t, float)[: c.rows],
+    def followed(self, c: Any) -> Followed:
+        """Return copies of what has been kept."""
+        count = self.directions.count
+        table = np.array(c.table[: c.rows], float).reshape(c.rows, self.size, self.wide)
+        firings = np.array(c.firings[: c.fired], float).reshape(c.fired, self.wide)
+        return Followed(
+            np.array(c.rows_t[: c.rows], float),
             table[:, :, :count],
             firings[:, :count],
-            np.asarray(arrays.S, float)[:, :count],
-            tuple(self.doubts(c, arrays)),
+            np.array(c.S, float)[:, :count],
+            tuple(self._doubts(c)),
         )
-        call.over()
-        return found
 
-    def doubts(self, c: Any, arrays: Any) -> Iterator[DerivativeDoubt]:
+    def _doubts(self, c: Any) -> Iterator[DerivativeDoubt]:
         """Yield what is doubtful, in words."""
-        names = self.program.relations
-        ends = [int(end) for end in arrays.doubt_end[: c.doubts]]
-        named = np.split(np.asarray(arrays.doubt_names, int), ends)[:-1]
-        for t, kind, which in zip(arrays.doubt_t, arrays.doubt_kind, named, strict=False):
+        names, begin = self.program.relations, 0
+        for k in range(c.doubts):
+            end = int(c.doubt_end[k])
+            which = [int(r) for r in c.doubt_names[begin:end]]
             said = dict.fromkeys(names[r] if r < len(names) else SLIDE_ENDS for r in which)
-            word, place, reason = DOUBTS[int(kind)]
-            yield DerivativeDoubt(word, float(t), place or f"{' and '.join(said)} changes", reason)
+            word, place, reason = DOUBTS[int(c.doubt_kind[k])]
+            t, begin = float(c.doubt_t[k]), end
+            yield DerivativeDoubt(word, t, place or f"{' and '.join(said)} changes", reason)
+
+
+def followed_in_python(
+    run: TangentRun, options: LoopOptions, start: tuple[float, list[float], list[int], float]
+) -> Followed:
+    """Run once more without machine code, and follow it; its rows are not kept."""
+    program, (t, y, mode, last) = run.program, start
+    plain, asked = equations(program).functions(located=True), machines_of(program.ieee)
+    functions, machines = run.traced(plain, asked, as_lists)
+    every = dataclasses.replace(options, times=None)
+    b = hybrid.buffers(equations(program), t, y, mode, last, every, ROWS_AT_ONCE)
+    on = Held(functions, b.now.held, b.sliding)
+    motion, solver = ArcMotion(flow_on, margins_on, on, follow_on, machines.moved), None
+    if b.plan.foreign:
+        from integrators.runners.scipy_arcs import SciPyStepper
+
+        solver = SciPyStepper(on, b, options, machines.moved)
+    c = functions.p.course
+    run.begin(c, t, y, last, run.directions.scales)
+    event = ROWS
+    while event != DONE:
+        run.make_room(c, ROWS_AT_ONCE + 2, 1)
+        event = run_to_event(functions, machines, motion, b, ROWS_AT_ONCE)
+        machines.noted(event, on, b)
+        if event == ADVANCE and solver is not None:
+            solver.advance(ROWS_AT_ONCE)
+        elif event == ROWS:
+            b.out.row = b.memory.taken = 0
+        elif event not in (FIRING, FIRED, SLID, STOPPED, DONE):
+            raise RuntimeError(f"a run has ended otherwise than before: {event}")
+    return run.followed(c)
+
+
+def as_lists(array: Any) -> Any:
+    """Return an array as lists."""
+    return array.tolist()
+
+
+def as_columns(array: Any) -> Any:
+    """Return what stands for an array of any length in a block of machine code."""
+    from integrators.machine_code.layout import OuterArray
+
+    return OuterArray(array.dtype.kind, table=array.ndim == 2)
+
+
+def _lengthen(c: Any, needed: int, *names: str) -> None:
+    """Make columns long enough, and at least twice as long as they are."""
+    for name in names:
+        column = getattr(c, name)
+        if (length := len(column)) >= needed:
+            continue
+        more = max(needed - length, length)
+        if isinstance(column, list):
+            column += [copy.copy(column[0]) for _ in range(more)]
+        else:
+            setattr(
+                c, name, np.concatenate([column, np.zeros((more, *column.shape[1:]), column.dtype)])
+            )
 
 
 SLIDE_ENDS = "the end of a slide"
@@ -365,36 +388,6 @@ DOUBTS = {
         "none", "the slope of a rate is not finite", "nothing has a derivative from then on",
     ),
 }  # fmt: skip
-
-
-@dataclass(eq=False)
-class _TangentCall:
-    """What goes on with a run."""
-
-    on: Callable[[], int]
-    course: Any  # has the numbers
-    arrays: Any  # has the columns
-    over: Callable[[], None] = lambda: None
-
-    def make_room(self) -> None:
-        """Double the columns that are full, or will be soon."""
-        c, a = self.course, self.arrays
-        full = {"firings": c.fired + 1, "rows_t": c.rows + ROWS_AT_ONCE + 2}
-        full["doubt_t"] = c.doubts + 3
-        full["doubt_names"] = c.named + 3 * len(a.watch)
-        pairs = {"rows_t": ("rows_t", "table"), "doubt_t": ("doubt_t", "doubt_kind", "doubt_end")}
-        for name, needed in full.items():
-            if needed >= len(getattr(a, name)) and not (name == "rows_t" and len(a.times)):
-                for each in pairs.get(name, (name,)):
-                    column = getattr(a, each)
-                    if isinstance(column, list):
-                        column += copy.deepcopy(column)
-                    else:
-                        setattr(a, each, np.concatenate([column, np.zeros_like(column)]))
-
-
-_FLOATS = ("jumps", "before_jumps", "knots")
-_KEPT: dict[Any, Any] = {}
 
 
 @functools.lru_cache(maxsize=64)

@@ -10,47 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gms_fsm.charts.parameters import FloatArray
-from gms_fsm.gradients.tangents import ActiveNumbers, tangents
+from gms_fsm.gradients.directions import Directions
+from gms_fsm.gradients.following import TangentRun, as_lists
+from gms_fsm.gradients.tangents import tangents
 from gms_fsm.lowering.observing import armed
-from gms_fsm.lowering.program import Program
-from integrators.sliding import go_back, go_to
+from gms_fsm.lowering.program import Program, equations, machines_of
+from integrators.sliding import Functions, Held, go_back, go_to
+from integrators.tangents.motion import slide_in_lanes
 
 FEW = 6  # directions that are computed one by one: numbers are faster than short arrays
 Modes = Sequence[int]
-
-
-@dataclass(frozen=True)
-class Directions:
-    """Directions in which the numbers and the initial state change.
-
-    Parameters
-    ----------
-    names : tuple of str
-        As the user gave them.
-    shared, own : mapping
-        For each number that changes, by its place, what it changes by in each direction: shape
-        (directions,), or (elements, directions).
-    y : ndarray, shape (m, directions)
-        Change of the initial state.
-    scales : ndarray, shape (directions,)
-        How much a number changes at most, for tolerances.
-    """
-
-    names: tuple[str, ...]
-    shared: dict[int, FloatArray]
-    own: dict[int, FloatArray]
-    y: FloatArray
-    scales: FloatArray
-
-    @cached_property
-    def places(self) -> ActiveNumbers:
-        """Which numbers change."""
-        return ActiveNumbers(frozenset(self.shared), frozenset(self.own))
-
-    @property
-    def count(self) -> int:
-        """Number of directions."""
-        return len(self.names)
 
 
 class _Slide(NamedTuple):
@@ -184,47 +153,32 @@ class Linear:
         y_t: Any,
     ) -> _Slide:
         """Return the slope along surfaces, as `integrators.sliding` has it, and the sigmas."""
-        program, modes, signs = self.program, list(mode), list(held)
-        surfaces, size = program.surfaces, len(y)
-        which = np.flatnonzero(mode[program.layout.slides]).tolist()
-        for k in which:
-            if surfaces.machine[k] < 0:
-                signs[surfaces.sign[k]] = 0.0
-        f = np.zeros(size)
-        slope = np.zeros((size, t_t.size))
-        if len(which) > 1:
-            one, slopes = self._plain(t, y, modes, signs, t_t, y_t)
-            f, slope = (1.0 - len(which)) * np.array(one), (1.0 - len(which)) * slopes
-        halves, half_slopes, normals, normal_slopes = [], [], [], []
-        for k in which:
-            sides = []
-            for side in (1.0, -1.0):
-                kept = go_to(surfaces, k, side, signs, modes)
-                sides.append(self._plain(t, y, modes, signs, t_t, y_t))
-                go_back(surfaces, k, kept, signs, modes)
-            (up, up_t), (low, low_t) = sides
-            f += 0.5 * (np.array(up) + low)
-            slope = slope + 0.5 * (up_t + low_t)
-            halves.append(0.5 * (np.array(up) - low))
-            half_slopes.append(0.5 * (up_t - low_t))
-            arguments = (k, t, y, modes, program.p)
-            g, g_t = self.call("normal", arguments, t_t, y_t, size + 1)
-            normals.append(np.array(g))
-            normal_slopes.append(g_t)
-        H, dH = np.array(halves), np.array(half_slopes)
-        N, dN = np.array(normals), np.array(normal_slopes)
-        A = N[:, :-1] @ H.T
-        b = -(N[:, :-1] @ f + N[:, -1])
-        dA = np.einsum("rjp,cj->rcp", dN[:, :-1], H) + np.einsum("rj,cjp->rcp", N[:, :-1], dH)
-        db = -(np.einsum("rjp,j->rp", dN[:, :-1], f) + N[:, :-1] @ slope + dN[:, -1])
-        try:
-            sigma = np.linalg.solve(A, b)
-            d_sigma = np.linalg.solve(A, db - np.einsum("rcp,c->rp", dA, sigma))
-        except np.linalg.LinAlgError:
-            sigma, d_sigma = np.full(len(which), np.nan), np.full((len(which), t_t.size), np.nan)
-        f = f + sigma @ H
-        slope = slope + np.einsum("cp,cj->jp", d_sigma, H) + np.einsum("c,cjp->jp", sigma, dH)
-        return _Slide(f, slope, sigma, d_sigma, N[:, :-1])
+        flags, size, functions = mode[self.program.layout.slides], len(y), self._lane
+        traced: Any = functions.p
+        w, sliding = traced.lanes, traced.course.sliding
+        which = np.flatnonzero(flags).tolist()
+        count = sliding.count = len(which)
+        sliding.which[:count] = which
+        on, modes = Held(functions, list(held), sliding), list(mode)
+        slope, d_sigma = np.empty((size, t_t.size)), np.empty((count, t_t.size))
+        for c in range(t_t.size):
+            w.t[0] = float(t_t[c])
+            w.shared[:] = self.numbers[c][0]
+            for row, values in zip(w.own, self.numbers[c][1], strict=True):
+                row[: len(values)] = values
+            w.now.y[:] = [*y, *y_t[:, c].tolist()]
+            slide_in_lanes(on, t, w.now.y, modes, w.now.f)
+            slope[:, c], d_sigma[:, c] = w.now.f[size:], w.slide.sigma_t[:count]
+        N = np.array([normal[:size] for normal in sliding.normals[:count]])
+        return _Slide(np.array(w.now.f[:size]), slope, np.array(sliding.sigma[:count]), d_sigma, N)
+
+    @cached_property
+    def _lane(self) -> Functions:
+        """One direction of a motion along surfaces, in Python."""
+        program = self.program
+        alone = TangentRun(program, self.directions, program.layout.y.size, None, lanes=1)
+        plain, asked = equations(program).functions(located=True), machines_of(program.ieee)
+        return alone.traced(plain, asked, as_lists)[0]
 
     # ------------------------------------------------------------------ switches
     def armed(self, t: float, y: list[float], mode: Modes) -> list[float]:

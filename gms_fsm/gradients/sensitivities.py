@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.foundation.arguments import unknown
-from gms_fsm.gradients.following import Followed, follow
-from gms_fsm.gradients.linear import Directions, Linear
+from gms_fsm.gradients.directions import Directions
+from gms_fsm.gradients.following import Followed
+from gms_fsm.gradients.linear import Linear
 from gms_fsm.lowering.layout import SystemLayout
 from gms_fsm.lowering.program import Program
-from integrators import LoopOptions
 
 
 class TraceRows(Protocol):
@@ -51,18 +51,6 @@ class Sensitivities:
     directions: Directions
     followed: Followed
     seen: dict[str, FloatArray] = field(default_factory=dict, repr=False)
-
-    @classmethod
-    def of(
-        cls,
-        program: Program,
-        options: LoopOptions,
-        start: tuple[float, list[float], list[int], float],
-        directions: Directions,
-        rows: int,
-    ) -> Sensitivities:
-        """Differentiate a run of about so many rows."""
-        return cls(directions, follow(program, options, start, directions, rows))
 
     def column(self, to: str) -> int:
         """Return the place of a direction."""

@@ -27,7 +27,8 @@ MARK = "d__"  # before the name of a value: its tangent
 FUNCTIONS = ("flow", "observe", "margins", "normal", "act", "tick", "follow")
 VECTORS = ("y", "dy", "out")  # arrays that have tangents
 IN_THEIRS = ("y", "dy")  # in lanes these are in the same vector
-OF_LANES = ("flow", "margins", "normal", "act", "tick", "follow")
+OF_LANES = ("slope", "flow", "margins", "normal", "act", "tick", "follow")
+SLOPE = {"slope": "flow"}  # what computes at a fixed time only the tangents of what that fills
 ZERO = "0.0"
 ROUNDING = 1e-12  # a difference that is set to 0 below this, relative to its terms, keeps its slope
 
@@ -108,8 +109,11 @@ def with_tangents(
     body: list[ast.stmt] = []
     for part in ast.parse(source).body:
         if isinstance(part, ast.FunctionDef):
-            if part.name in names:
-                body.append(_function(part, active, lanes))
+            own = part.name
+            for name in (own, *(slope for slope, of in SLOPE.items() if of == own)):
+                if name in names:
+                    part.name = name
+                    body.append(_function(copy.deepcopy(part), active, lanes))
         else:
             body.append(part)
     return ast.unparse(ast.fix_missing_locations(ast.Module(body, [])))
@@ -145,7 +149,7 @@ class LanePlaces:
     size: int
 
     def spread(
-        self, target: ast.expr, terms: list[tuple[str, str]], value: ast.stmt
+        self, target: ast.expr, terms: list[tuple[str, str]], values: list[ast.stmt]
     ) -> list[ast.stmt]:
         """Return the assignments of a tangent in all lanes, and then that of the value."""
         factors, sums = [], []
@@ -156,7 +160,7 @@ class LanePlaces:
             sums.append(f"{factor} * {slope}" if factor else slope)
         text = f"{ast.unparse(target)} = {' + '.join(sums) or ZERO}"
         made = [_Lane(self, lane).visit(ast.parse(text).body[0]) for lane in range(self.count)]
-        return _once_each([*factors, value], len(factors), made)
+        return _once_each([*factors, *values], len(factors), made)
 
 
 class _Lane(ast.NodeTransformer):
@@ -230,7 +234,9 @@ class _TangentWriter:
         self, active: ActiveNumbers, function: ast.FunctionDef, lanes: LanePlaces | None
     ) -> None:
         self.places, self.lanes = active, lanes
-        self.active = {"t", *VECTORS}
+        alone = function.name in SLOPE
+        self.active = {*VECTORS} if alone else {"t", *VECTORS}
+        self.left_out = "dy" if alone and not _reads(function, "dy") else ""
         while True:  # until no more names depend on something that has a tangent
             before = len(self.active)
             for node in ast.walk(function):
@@ -284,10 +290,11 @@ class _TangentWriter:
                 tangent = f"{MARK}{name}[{ast.unparse(place)}]"
             case _:
                 return [value]
+        values = [] if self.left_out and tangent.startswith(f"{MARK}{self.left_out}[") else [value]
         if self.lanes is None or any(slope.startswith(f"{MARK}own[") for _, slope in terms):
-            return [*ast.parse(f"{tangent} = {total(terms)}").body, value]
+            return [*ast.parse(f"{tangent} = {total(terms)}").body, *values]
         made: Any = ast.parse(tangent, mode="eval").body
-        return self.lanes.spread(made, terms, value)
+        return self.lanes.spread(made, terms, values)
 
     # ------------------------------------------------------------------ expressions
     def tangent(self, value: ast.expr) -> str:
@@ -391,6 +398,17 @@ class _Atoms(ast.NodeTransformer):
 def _factor(partial: Value, written: Mapping[str, str]) -> str:
     text = spell(partial, rename=written)
     return text if text.isidentifier() else f"({text})"
+
+
+def _reads(function: ast.FunctionDef, array: str) -> bool:
+    """Return whether a function reads entries of an array."""
+    return any(
+        isinstance(node, ast.Subscript)
+        and isinstance(node.ctx, ast.Load)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == array
+        for node in ast.walk(function)
+    )
 
 
 def _is_rounding(node: ast.If) -> bool:

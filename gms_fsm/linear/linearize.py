@@ -11,7 +11,8 @@ import numpy as np
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind, refusing, unknown
-from gms_fsm.gradients.linear import Directions, Linear
+from gms_fsm.gradients.directions import Directions
+from gms_fsm.gradients.linear import Linear
 from gms_fsm.language import evaluate, parse_value
 from gms_fsm.lowering.observing import armed
 from gms_fsm.lowering.program import Program, lower

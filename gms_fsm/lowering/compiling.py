@@ -83,30 +83,39 @@ def plan_in_block(plan: Any, places: Any) -> Any:
 
 
 def engine(
-    program: Program, run: RecordArguments, counting: Counting | None = None
+    program: Program,
+    run: RecordArguments,
+    counting: Counting | None = None,
+    tangents: str = "",
+    lanes: int = 0,
 ) -> CompiledFunction:
-    """Return the loop of a program as machine code, which may count its rows.
+    """Return the loop of a program as machine code, which may count its rows, or have tangents.
 
-    Its further functions `adapt` and `repeat` let everything follow from other numbers.
+    Its further functions `adapt` and `repeat` let everything follow from other numbers; with
+    tangents there is no `repeat`. Their text says how they are computed, several side by side.
     """
     from integrators.runners import compiled
     from integrators.runners.repeating import repeat
 
     check_llvmlite()
-    text = text_of(program, "" if counting is None else counting.source)
-    more = [
-        compiled.EntryPoint("adapt", adapt, OF_A_RUN),
-        compiled.EntryPoint("repeat", repeat, OF_MANY, ("start", "count", "steps")),
-    ]
+    text = text_of(program, tangents if counting is None else counting.source)
+    if tangents:
+        more = [compiled.EntryPoint("adapt", adapt, f"functions.p.{OF_A_RUN}")]
+    else:
+        more = [
+            compiled.EntryPoint("adapt", adapt, OF_A_RUN),
+            compiled.EntryPoint("repeat", repeat, OF_MANY, ("start", "count", "steps")),
+        ]
     with _lock:
         stamp = functools.partial(stamp_of, program.plan)
-        return compiled.engine(text, run, _calls(program), store(), notify, more, stamp)
+        calls = _calls(program)
+        return compiled.engine(text, run, calls, store(), notify, more, stamp, lanes > 1)
 
 
-def with_more(engine: CompiledFunction) -> Library:
-    """Return the machine code of an engine with its further functions."""
+def with_more(engine: CompiledFunction, *, alone: bool = False) -> Library:
+    """Return the machine code of an engine with its further functions, or these alone."""
     with _lock:
-        return engine.extended
+        return engine.beside if alone else engine.extended
 
 
 def text_of(program: Program, more: str = "") -> str:

@@ -65,6 +65,7 @@ from gms_fsm.systems.signals import (
 from gms_fsm.systems.system import System
 from integrators import LIVE
 from integrators.switching.jolts import CHANGES_FORCES, EVENT, IMPULSE, MOST_EVENTS, TICK
+from integrators.switching.machines import Machines
 
 Arguments = tuple[list[float], list[list[float]], list[list[float]]]
 
@@ -344,6 +345,12 @@ def arguments(system: System) -> Arguments:
         for column in (s.times, s.values)
     ]
     return list(shared.values()), [as_floats(values) for _, values in own.values()], tables
+
+
+def machines_of(functions: Mapping[str, Any]) -> Machines:
+    """Return the machines of a program as functions, in one of their forms."""
+    names = "switch", "act", "tick", "jolts", "observe"
+    return Machines(*(functions[name] for name in names))
 
 
 def equations(program: Program) -> integrators.Equations:

@@ -199,7 +199,11 @@ def numbers_of(what: Mounted) -> dict[str, NamedNumber]:
 
 def number_of(what: Mounted, name: object) -> NamedNumber:
     """Return the number of this name; raise `ParameterError` if there is none."""
-    numbers = numbers_of(what)
+    return number_in(numbers_of(what), name)
+
+
+def number_in(numbers: Mapping[str, NamedNumber], name: object) -> NamedNumber:
+    """Return the one of this name among all numbers of a system, as `number_of`."""
     if isinstance(name, str) and name in numbers:
         return numbers[name]
     if any(each.whole == name for each in numbers.values()):

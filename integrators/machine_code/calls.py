@@ -69,6 +69,13 @@ class CompiledFunction:
                 library.add(self.more(), ["entry"])
             return library
 
+    @functools.cached_property
+    def beside(self) -> Library:
+        """The further functions alone, which then may not call `entry`."""
+        assert self.more is not None
+        with self._lock:
+            return Library(self.more())
+
     def _load(self, *, at_once: bool) -> None:
         """Load what there is no function of yet, or what takes less time."""
         with self._lock:

@@ -50,11 +50,12 @@ def target_name() -> str:
     return f"{version} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
 
 
-def _builder(machine: Any, speed: int) -> Any:
+def _builder(machine: Any, speed: int, *, vectors: bool = False) -> Any:
     llvm = _binding()
     options = llvm.create_pipeline_tuning_options(speed_level=speed)
-    # Numbers side by side are computed together: nothing is reassociated, the bits are the same.
-    options.loop_vectorization = options.slp_vectorization = True
+    # Short loops are not worth vectors; lanes are.
+    options.loop_vectorization = vectors
+    options.slp_vectorization = vectors
     return llvm.create_pass_builder(machine, options)
 
 
@@ -74,7 +75,7 @@ def _parsed(text: str) -> Any:
     return module
 
 
-def compiled(text: str, hot: Collection[str] | None = None) -> bytes:
+def compiled(text: str, hot: Collection[str] | None = None, *, vectors: bool = False) -> bytes:
     """Return the object of a module.
 
     Parameters
@@ -84,6 +85,8 @@ def compiled(text: str, hot: Collection[str] | None = None) -> bytes:
     hot : collection of str, optional
         The functions in which the time is spent; the others are made only a little slower, in much
         less time. All of them if omitted.
+    vectors : bool
+        Whether numbers side by side are computed together: the bits are the same.
 
     Returns
     -------
@@ -101,8 +104,8 @@ def compiled(text: str, hot: Collection[str] | None = None) -> bytes:
     with _lock:
         module = _parsed(text)
         machine = _machine()
-        thorough = _builder(machine, 3)
-        builder = thorough if hot is None else _builder(machine, 1)
+        thorough = _builder(machine, 3, vectors=vectors)
+        builder = thorough if hot is None else _builder(machine, 1, vectors=vectors)
         builder.getModulePassManager().run(module, builder)
         if hot is not None:
             passes = thorough.getFunctionPassManager()

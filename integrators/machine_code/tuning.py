@@ -24,5 +24,5 @@ INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(ALWAYS, True)
 # Every step calls these.
 HOT = {
     "advance", "_along", "first_change", "_bracket", "_error", "interpolate", "margins",
-    "observe_rows", "_probe", "rate_in_lanes", "_search", "switch", "take_step",
+    "observe_rows", "_probe", "rate_in_lanes", "_search", "slope_in_lanes", "switch", "take_step",
 }  # fmt: skip

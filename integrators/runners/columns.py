@@ -83,13 +83,14 @@ def record(
     counting, last = len(tally.counts) > 0, b.out.steps + most_steps
     seen_at = float("nan")  # the time at which log.seen was computed
     on = Held(functions, now.held, b.sliding)
-    motion = ArcMotion(flow_on, margins_on, on, follow_on)
-    left = most_steps
+    motion = ArcMotion(flow_on, margins_on, on, follow_on, machines.moved)
+    left, room = most_steps, True
     while True:
         left -= 1
-        if left < 0 or _is_full(out, log):
+        if left < 0 or not room or _is_full(out, log):
             return ROWS
         event = run_to_event(functions, machines, motion, b, most_steps)
+        room = machines.noted(event, on, b)
         t = min(now.t, now.seen)
         if event == ROWS:
             if counting:

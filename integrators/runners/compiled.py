@@ -52,7 +52,6 @@ from integrators.switching import jolts, sliding_bounds
 from integrators.tangents import motion
 from integrators.tangents import run as tangent_run
 from integrators.tangents import switches as tangent_switches
-from integrators.tangents.run import FollowArguments
 
 __all__ = [
     "CodeStore",
@@ -65,7 +64,6 @@ __all__ = [
     "edition",
     "engine",
     "example",
-    "follower",
     "is_known",
     "observer",
     "stepper",
@@ -79,6 +77,9 @@ LOOPS = (
 _compiling = threading.RLock()  # runs may be in several threads
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8
+# States side by side from which on vectors save more than they cost: what has been stored one by
+# one is read together late.
+WORTH_VECTORS = 8
 
 
 class RecordArguments(NamedTuple):
@@ -106,12 +107,15 @@ class EntryPoint(NamedTuple):
         The parts of the block that are its first arguments, as in `BlockLayout.part`; all if empty.
     extra : tuple of str
         Integers that are passed besides the block.
+    vectors : bool
+        Whether it computes numbers side by side.
     """
 
     name: str
     function: Callable[..., Any]
     parts: str = ""
     extra: tuple[str, ...] = ()
+    vectors: bool = False
 
 
 RECORD = "functions machines buffers log recorded tally"
@@ -296,7 +300,12 @@ def _object(
             translator = translated(layout, entries, each=each)
             hot = {name for name, own in translator.origins.items() if own in HOT}
             made = llvm_text(translator.module)
-        content = objects.compiled_at_once(made) if at_once else objects.compiled(made, hot)
+        vectors = entries[0].vectors
+        content = (
+            objects.compiled_at_once(made)
+            if at_once
+            else objects.compiled(made, hot, vectors=vectors)
+        )
         if store is not None:
             store.put(name, content)
         notify(f"compiled in {time.perf_counter() - started:.1f} s")
@@ -357,6 +366,7 @@ def engine(
     notify: Callable[[str], None],
     more: Sequence[EntryPoint] = (),
     text_of_more: Callable[[], str] = str,
+    vectors: bool = False,
 ) -> CompiledFunction:
     """Return `integrators.runners.columns.record` as machine code for one system.
 
@@ -377,13 +387,16 @@ def engine(
         `CompiledFunction.extended` is asked for. As `OuterEntry`, ``"entry"`` is this engine.
     text_of_more : callable, optional
         Returns a text that changes with them.
+    vectors : bool
+        Whether the system's functions compute numbers side by side.
 
     Returns
     -------
     CompiledFunction
         To be called with a block, the largest number of steps, and whether to pause.
     """
-    record = EntryPoint("entry", columns.record, RECORD, ("steps", "pause"))
+    vectors = vectors or len(arguments.buffers.now.y) >= WORTH_VECTORS
+    record = EntryPoint("entry", columns.record, RECORD, ("steps", "pause"), vectors)
     made = _made(text, arguments, [record], calls, store, notify)
     if more:
 
@@ -545,11 +558,3 @@ def observer(
     )
     entry = EntryPoint("entry", observing.observe_rows, extra=("start", "count"))
     return _made(text, rows, [entry], calls, store, notify), rows
-
-
-def follower(
-    text: str, arguments: FollowArguments, store: CodeStore | None, notify: Callable[[str], None]
-) -> CompiledFunction:
-    """Return `integrators.tangents.run.follow_run` as machine code, as `engine` does."""
-    entry = EntryPoint("entry", tangent_run.follow_run, extra=("steps",))
-    return _made(text, arguments, [entry], (), store, notify)

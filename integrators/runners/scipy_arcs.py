@@ -6,6 +6,7 @@ For stiff systems. The solver chooses its steps; crossings are located on its de
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from integrators.advance import (
 )
 from integrators.crossings import NO_CHANGE, Path, copy_margins, first_change, listed
 from integrators.sliding import Held, flow_on, follow_on, margins_on
-from integrators.steps import ArcMotion
+from integrators.steps import ArcMotion, moves_alone
 
 if TYPE_CHECKING:
     from integrators.hybrid import Buffers, LoopOptions
@@ -44,12 +45,20 @@ class SciPyStepper:
     on, buffers, options
         The system on its surfaces, and the run. With a fixed ``step`` the solver goes from grid
         point to grid point (it keeps its error control, so it may take several steps to each).
+    moved : callable, optional
+        What moves with the state; see `ArcMotion`.
     """
 
-    def __init__(self, on: Held, buffers: Buffers, options: LoopOptions) -> None:
+    def __init__(
+        self,
+        on: Held,
+        buffers: Buffers,
+        options: LoopOptions,
+        moved: Callable[..., Any] = moves_alone,
+    ) -> None:
         if not (isinstance(options.method, type) and issubclass(options.method, OdeSolver)):
             raise TypeError(f"method {options.method!r} is not a scipy.integrate.OdeSolver class")
-        self.on, self.buffers, self.options = on, buffers, options
+        self.on, self.buffers, self.options, self.moved = on, buffers, options, moved
         self.solver: Any = None
 
     def advance(self, most_steps: int) -> None:
@@ -92,7 +101,7 @@ class SciPyStepper:
     def _advance(self, most_steps: int) -> int:
         b, now, out = self.buffers, self.buffers.now, self.buffers.out
         y, w = now.y, listed(b.relations, b.memory.active)
-        motion = ArcMotion(flow_on, margins_on, self.on, follow_on)
+        motion = ArcMotion(flow_on, margins_on, self.on, follow_on, self.moved)
         redone, ahead = False, math.inf
         while True:
             t = now.t
@@ -138,6 +147,7 @@ class SciPyStepper:
             else:
                 y[:] = y_new
             motion.follow(t_new, y, now.mode, now.held, motion.p)
+            motion.moved(t_new, now, b.scratch, False, motion.p)
             now.t = t_new
             most_steps -= 1
             if out.every_step:

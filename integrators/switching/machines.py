@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from integrators.steps import Vector
+from integrators.steps import Vector, moves_alone
 
 
 class Switching(Protocol):
@@ -39,11 +39,18 @@ class Switching(Protocol):
         """Store velocities; if mark is 1, mark machines whose velocities differ from the stored."""
 
 
+def happens_alone(event: int, on: Any, b: Any) -> bool:  # noqa: ARG001 (as others have them)
+    """Go on: nothing else is told of events, and needs room."""
+    return True
+
+
 class Machines(NamedTuple):
-    """A `Switching` made of functions, and a function that observes firings."""
+    """A `Switching` made of functions, and functions that observe a run."""
 
     ask: Callable[..., Any]
     act: Callable[..., Any]
     tick: Callable[..., Any]
     jolts: Callable[..., Any]
     observe: Callable[..., Any]  # observe(t, y, mode, signs, p, seen)
+    moved: Callable[..., Any] = moves_alone  # after each step, as in `ArcMotion`
+    noted: Callable[..., Any] = happens_alone  # noted(event, on, b): whether there is room for more

@@ -32,6 +32,7 @@ class LaneFunctions(NamedTuple):
     Each takes its own arguments, then the tangents of t, of the numbers, and of what it fills.
     """
 
+    slope: Callable[..., Any]  # only the tangents that flow fills, those of t left out
     flow: Callable[..., Any]
     margins: Callable[..., Any]
     normal: Callable[..., Any]
@@ -81,6 +82,9 @@ class TangentCourse:
     instant: int  # whether the last arc has ended
     changed: int  # how many comparisons have ended it
     moving: int  # whether the tangents are at an instant that moves
+    fresh: int  # whether an arc begins, of which no slope is known
+    finite: int  # whether all tangents were finite where the arc began, and are
+    stage: int  # of the step of the run that they follow
     rows: int  # how many are kept
     fired: int
     next_time: int
@@ -105,6 +109,8 @@ class TangentCourse:
     t_t: Vector  # of the instant
     t_before: Vector  # of the last one
     slopes: list[Vector]  # of the margins, shape (relations, directions)
+    slope: list[Vector]  # of each group: that of the state and its tangents
+    steps: Vector  # ... and the longest step
     moves: list[Vector]  # of the numbers, lanes of each group: shared, then own ones
     scales: Vector
     # What is kept:
@@ -127,6 +133,7 @@ class Traced(NamedTuple):
     method: Coefficients
     rtol: Vector
     every: list[int]  # whether all rows are kept
+    same: list[int]  # whether the run has the method of its tangents
     locks: list[int]  # whether locks determine components
     wide: list[int]  # number of directions
     course: TangentCourse
@@ -142,6 +149,29 @@ def rate_in_lanes(t: float, y: Vector, mode: list[int], held: Vector, on: Held, 
         on.functions.p.tangents.flow(t, y, mode, held, p, dy, w.t, (w.shared, w.own))
     else:
         slide_in_lanes(on, t, y, mode, dy)
+
+
+class TakenStep(NamedTuple):
+    """A step of a run that its tangents follow stage by stage."""
+
+    on: Held
+    scratch: Scratch
+
+
+def slope_in_lanes(
+    t: float, y: Vector, mode: list[int], held: Vector, step: TakenStep, dy: Vector
+) -> None:
+    """Fill the rates of tangents at the next stage of a step, whose own rates are known."""
+    traced: Any = step.on.functions.p
+    c, w, k = traced.course, traced.lanes, step.scratch.k
+    numbers = w.shared, w.own
+    traced.tangents.slope(t, y, mode, held, traced.functions.p, dy, w.t, numbers)
+    for j in range(len(c.y)):
+        if c.stage < len(k):
+            dy[j] = k[c.stage][j]
+        else:
+            dy[j] = step.scratch.f_new[j]
+    c.stage += 1
 
 
 def slide_in_lanes(on: Held, t: float, y: Vector, mode: list[int], dy: Vector) -> None:
@@ -221,6 +251,12 @@ def margins_in_lanes(
 
 
 # --------------------------------------------------------------------------- groups of directions
+def groups_of(traced: Traced) -> int:
+    """Return how many groups have a direction; the time, in the next place, may have one alone."""
+    lanes = len(traced.lanes.t)
+    return (traced.wide[0] + lanes - 1) // lanes
+
+
 def take_group(traced: Traced, group: int, y: Vector) -> None:
     """Put a state and the tangents of a group of directions into its lanes; of the time none."""
     w, S, size = traced.lanes, traced.course.S, len(y)

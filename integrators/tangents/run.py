@@ -1,33 +1,40 @@
 """A run with its tangents: the loop goes on as ever, and they follow each of its steps and events.
 
-Between two rows a state and its tangents are integrated together, group of directions by group.
-They take no part in the choice of the steps, so that the run has its bits; an error estimate of
-their own divides a step where the tangents need it.
+Along a step a state and its tangents are integrated together, group of directions by group. They
+take no part in the choice of the steps, so that the run has its bits; an error estimate of their
+own divides a step where the tangents need it.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from integrators.advance import CROSSED, TICK
-from integrators.loop import DONE, FIRED, FIRING, ROWS, SLID, STOPPED, Buffers, run_to_event
-from integrators.sliding import Functions, Held, flow_on, follow_on, margins_on
+from integrators.loop import DONE, FIRED, ROWS, SLID, STOPPED, Buffers
+from integrators.sliding import Held, Sliding, follow_on, margins_on
 from integrators.step_size import INFINITY, root_of
 from integrators.steps import (
     ArcMotion,
+    Now,
+    Scratch,
     Vector,
     fit_dense,
     interpolate,
+    moves_alone,
     take_step,
     weighted_sum,
 )
 from integrators.switching.machines import Machines
+from integrators.tangents import switches
 from integrators.tangents.motion import (
     Lanes,
+    TakenStep,
     TangentCourse,
     Traced,
+    groups_of,
     put_group,
     rate_in_lanes,
+    slope_in_lanes,
     take_group,
 )
 from integrators.tangents.switches import (
@@ -40,69 +47,51 @@ from integrators.tangents.switches import (
     slide_as,
 )
 
-__all__ = ["FollowArguments", "follow_run"]
+__all__ = ["machines_that_note"]
 
 SAFE, LEAST, MOST = 0.9, 0.2, 3.0  # of the step control
 ORDER = 5
-LOOSE = 30.0  # tolerances that a step of tangents may take
+LOOSE = 100.0  # tolerances that a step of tangents may take
 SHARE = 1e-3  # of the largest tangent that a component could have: what is small beside it
 ROUNDING = 2.0**-52
 SMALLEST = 1e-300
 
 
-class FollowArguments(NamedTuple):
-    """The arguments of `follow_run`, without the last one."""
-
-    functions: Functions  # with traced parameters
-    machines: Machines  # those that note
-    buffers: Buffers  # with rows of every step
+def machines_that_note() -> Machines:
+    """Return the machines of a run with traced parameters, whose tangents follow it."""
+    s = switches
+    return Machines(s.ask, s.act, s.tick, s.jolts, s.observe, moved, noted)
 
 
-def follow_run(functions: Functions, machines: Machines, b: Buffers, most_steps: int) -> int:
-    """Run until the end (DONE), until something has no room or for so many steps (ROWS)."""
-    traced: Any = functions.p
-    c, now, out, memory = traced.course, b.now, b.out, b.memory
-    on, own = Held(functions, now.held, b.sliding), Held(functions, c.held, c.sliding)
-    motion, last = ArcMotion(flow_on, margins_on, on, follow_on), out.steps + most_steps
-    while True:
-        if out.steps >= last or _is_full(traced, len(out.rows_t)):
-            return ROWS
-        event = run_to_event(functions, machines, motion, b, len(out.rows_t))
-        if event == ROWS:
-            _take_rows(own, b)
-            out.row = 0
-            memory.taken = 0
-        elif event in (FIRED, SLID):
-            _hold(own, b, now.y)
-        elif event in (STOPPED, DONE):
-            if c.instant == 0 and memory.status == CROSSED and now.t <= now.seen:
-                _cross(own, b)
-            c.instant = 1
-            for j in range(len(c.y)):
-                c.y[j] = now.y[j]
-            c.t = max(c.t, min(now.t, now.seen))  # a jump is one clock tick later
-            if event == DONE:
-                _finish(own, b)
-                return DONE
-        elif event != FIRING:
-            return event
-
-
-def _is_full(traced: Traced, rows: int) -> bool:
-    """Return whether a column has no room for what the next event may bring."""
-    c = traced.course
-    if traced.every[0] > 0 and c.rows + rows + 1 >= len(c.rows_t):
-        return True
-    if c.doubts + 2 >= len(c.doubt_t) or c.named + 2 * len(c.watch) >= len(c.doubt_names):
-        return True
-    return c.fired >= len(c.firings)
+def noted(event: int, on: Held, b: Buffers) -> bool:
+    """Follow what has happened; return whether there is room for what the next event may bring."""
+    traced: Any = on.functions.p
+    c: TangentCourse = traced.course
+    now, memory = b.now, b.memory
+    own = Held(on.functions, c.held, c.sliding)
+    if event == ROWS:
+        if c.instant > 0 and b.out.row > memory.taken:
+            _hold(own, b)
+    elif event in (FIRED, SLID):
+        _hold(own, b)
+    elif event in (STOPPED, DONE):
+        if c.instant == 0 and memory.status == CROSSED and now.t <= now.seen:
+            _cross(own, b)
+        c.instant = 1
+        for j in range(len(c.y)):
+            c.y[j] = now.y[j]
+        c.t = max(c.t, min(now.t, now.seen))  # a jump is one clock tick later
+        if event == DONE:
+            _finish(own, b)
+    names: int = c.named + 3 * len(c.watch)
+    return c.doubts + 3 < len(c.doubt_t) and names < len(c.doubt_names)
 
 
 # --------------------------------------------------------------------------- instants
-def _hold(own: Held, b: Buffers, y: Vector) -> None:
+def _hold(own: Held, b: Buffers) -> None:
     """Note a row of an instant."""
     traced: Any = own.functions.p
-    c = traced.course
+    c, y = traced.course, b.now.y
     for j in range(len(y)):
         c.y[j] = y[j]
     c.instant = 1
@@ -136,17 +125,30 @@ def _cross(own: Held, b: Buffers) -> None:
         arrive(own)
 
 
-def _begin(own: Held, b: Buffers) -> None:
+def _begin(own: Held, now: Now, sliding: Sliding) -> None:
     """Begin an arc."""
-    c: TangentCourse = own.functions.p.course
-    slide_as(c.sliding, b.sliding)
+    traced: Any = own.functions.p
+    c, along = traced.course, traced.lanes.now
+    slide_as(c.sliding, sliding)
     for k in range(len(c.held)):
-        c.held[k] = b.now.held[k]
+        c.held[k] = now.held[k]
+        along.held[k] = now.held[k]
     for i in range(len(c.mode)):
-        c.mode[i] = b.now.mode[i]
+        c.mode[i] = now.mode[i]
+        along.mode[i] = now.mode[i]
+    for j in range(len(c.y)):
+        c.sizes[j] = max(c.sizes[j], abs(c.y[j]))
     fix(own, c.mode)
     c.instant = 0
     c.changed = 0
+    c.fresh = 1
+    c.finite = 1
+    for j in range(len(c.S)):
+        for u in c.S[j]:
+            if not abs(u) < INFINITY:
+                c.finite = 0
+    for group in range(len(c.steps)):
+        c.steps[group] = INFINITY
 
 
 def _finish(own: Held, b: Buffers) -> None:
@@ -168,108 +170,104 @@ def _finish(own: Held, b: Buffers) -> None:
 
 
 # --------------------------------------------------------------------------- arcs
-def _take_rows(own: Held, b: Buffers) -> None:
-    """Go on along new rows; those at the very start of an arc belong to the instant before."""
+def moved(t: float, now: Now, scratch: Scratch, whole: bool, on: Held) -> None:
+    """Go on along a step; one of no length is of the instant before."""
+    traced: Any = on.functions.p
+    c = traced.course
+    if t <= c.t:
+        return
+    own = Held(on.functions, c.held, c.sliding)
+    if c.instant > 0:
+        _begin(own, now, on.sliding)
+    for j in range(len(c.y)):
+        c.sizes[j] = max(c.sizes[j], abs(now.y[j]))
+    sliding = len(on.sliding.which) > 0 and on.sliding.count > 0
+    alike = 1 if whole and not sliding else 0
+    step = TakenStep(own, scratch)
+    first, finite = c.next_time, True
+    for group in range(groups_of(traced)):
+        take_group(traced, group, c.y)
+        c.next_time = first
+        finite = _along(step, alike * traced.same[0], t, now.y, group) and finite
+        put_group(traced, group)
+    c.rows += traced.every[0] + c.next_time - first
+    c.fresh = 0
+    if not finite and c.finite > 0:
+        for r in range(len(c.watch)):
+            c.watch[r] = 0
+        doubt(c, NO_SLOPE, t, -1)
+        c.finite = 0
+    c.before = c.t
+    c.t = t
+    for j in range(len(c.y)):
+        c.y_before[j] = c.y[j]
+        c.y[j] = now.y[j]
+
+
+def _along(taken: TakenStep, alike: int, end: float, y: Vector, group: int) -> bool:
+    """Integrate the lanes of a group to the end of a step; return whether they are finite there.
+
+    Where that is short enough for them, and alike, its own stages are theirs.
+    """
+    own = taken.on
     traced: Any = own.functions.p
-    c, out, first = traced.course, b.out, 0
-    while first < out.row and out.rows_t[first] <= c.t:
-        _hold(own, b, out.rows_y[first])
-        first += 1
-    if first < out.row:
-        if c.instant > 0:
-            _begin(own, b)
-        for j in range(len(c.y)):
-            c.sizes[j] = max(c.sizes[j], abs(c.y[j]))
-            for row in range(first, out.row):
-                c.sizes[j] = max(c.sizes[j], abs(out.rows_y[row][j]))
-        finite, bad = _is_finite(c.S), INFINITY
-        lanes = len(traced.lanes.t)
-        end, wanted = out.rows_t[out.row - 1], c.next_time
-        while wanted < len(c.times) and c.times[wanted] < end:
-            wanted += 1
-        kept = out.row - first if traced.every[0] > 0 else wanted - c.next_time
-        for group in range((traced.wide[0] + lanes - 1) // lanes):
-            take_group(traced, group, c.y)
-            bad = min(bad, _along(own, b, first, group))
-            put_group(traced, group)
-        if finite and bad < INFINITY:
-            for r in range(len(c.watch)):
-                c.watch[r] = 0
-            doubt(c, NO_SLOPE, bad, -1)
-        c.rows += kept
-        c.next_time = wanted
-        for row in range(max(first, out.row - 2), out.row):
-            c.before = c.t
-            c.t = out.rows_t[row]
-            for j in range(len(c.y)):
-                c.y_before[j] = c.y[j]
-                c.y[j] = out.rows_y[row][j]
-
-
-def _is_finite(S: list[Vector]) -> bool:
-    finite = True
-    for j in range(len(S)):
-        for u in S[j]:
-            finite = finite and abs(u) < INFINITY
-    return finite
-
-
-def _along(own: Held, b: Buffers, first: int, group: int) -> float:
-    """Integrate the lanes of a group along rows; return when they stop to be finite."""
-    traced: Any = own.functions.p
-    c, w, out = traced.course, traced.lanes, b.out
-    motion, size = ArcMotion(rate_in_lanes, margins_on, own, follow_on), len(c.y)
-    now, bad = w.now, INFINITY
-    place, wanted = c.rows, c.next_time
-    h = out.rows_t[out.row - 1] - c.t
+    c, w = traced.course, traced.lanes
+    motion = ArcMotion(rate_in_lanes, margins_on, own, follow_on, moves_alone)
+    as_taken = ArcMotion(slope_in_lanes, margins_on, taken, follow_on, moves_alone)
+    now, slope, size, place = w.now, c.slope[group], len(y), c.rows
     now.t = c.t
-    for i in range(len(c.mode)):
-        now.mode[i] = c.mode[i]
-    for k in range(len(c.held)):
-        now.held[k] = c.held[k]
-    rate_in_lanes(now.t, now.y, now.mode, now.held, own, now.f)
-    for row in range(first, out.row):
-        end = out.rows_t[row]
-        tick = TICK * max(abs(now.t), abs(end))
-        undivided = True
-        while now.t < end:
-            step = min(h, end - now.t)
-            t_new = end if end - now.t - step <= tick else now.t + step
-            step = t_new - now.t
+    c.stage = 0
+    if c.fresh > 0 and alike > 0:
+        slope_in_lanes(now.t, now.y, now.mode, now.held, taken, now.f)
+    elif c.fresh > 0:
+        rate_in_lanes(now.t, now.y, now.mode, now.held, own, now.f)
+    else:
+        for k in range(len(slope)):
+            now.f[k] = slope[k]
+    tick = TICK * max(abs(now.t), abs(end))
+    while now.t < end:
+        step = min(c.steps[group], end - now.t)
+        t_new = end if end - now.t - step <= tick else now.t + step
+        step = t_new - now.t
+        whole = now.t == c.t and t_new == end
+        if alike > 0 and whole:
+            c.stage = 1
+            take_step(as_taken, traced.method, now, t_new, w.scratch)
+        else:
             take_step(motion, traced.method, now, t_new, w.scratch)
-            worst = _error(traced, step)
-            if worst > LOOSE and step > tick:
-                undivided = False
-                h = step * max(LEAST, SAFE / root_of(worst / LOOSE, ORDER))
+        worst = _error(traced, step)
+        if worst > LOOSE and step > tick:
+            c.steps[group] = step * max(LEAST, SAFE / root_of(worst / LOOSE, ORDER))
+        else:
+            if whole:  # the steps of the run are short enough
+                c.steps[group] = INFINITY
             else:
-                undivided = undivided and t_new == end
-                h = max(h, step * min(MOST, SAFE / root_of(worst / LOOSE, ORDER)))
-                if wanted < len(c.times) and c.times[wanted] < t_new:
-                    fit_dense(traced.method, step, now.y, w.scratch)
-                while wanted < len(c.times) and c.times[wanted] < t_new:
-                    interpolate(w.scratch.dense, (c.times[wanted] - now.t) / step, w.scratch.error)
-                    _put(w, size, c.table[place], group, w.scratch.error)
-                    c.rows_t[place] = c.times[wanted]
-                    place += 1
-                    wanted += 1
-                now.t = t_new
-                for j in range(len(now.y)):
-                    now.y[j] = w.scratch.y_new[j]
-                    now.f[j] = w.scratch.f_new[j]
-        if undivided:  # the steps of the run are short enough
-            h = out.rows_t[out.row - 1] - c.t
-        known = out.rows_y[row]
-        for j in range(size):
-            now.y[j] = known[j]
-        if traced.every[0] > 0:
-            _put(w, size, c.table[place], group, now.y)
-            c.rows_t[place] = end
-            place += 1
-        if bad == INFINITY:
+                longer = step * min(MOST, SAFE / root_of(worst / LOOSE, ORDER))
+                c.steps[group] = max(c.steps[group], longer)
+            wanted = c.next_time < len(c.times) and c.times[c.next_time] < t_new
+            if wanted:
+                fit_dense(traced.method, step, now.y, w.scratch)
+            while c.next_time < len(c.times) and c.times[c.next_time] < t_new:
+                time = c.times[c.next_time]
+                interpolate(w.scratch.dense, (time - now.t) / step, w.scratch.error)
+                _put(w, size, c.table[place], group, w.scratch.error)
+                c.rows_t[place] = time
+                place += 1
+                c.next_time += 1
+            now.t = t_new
             for k in range(len(now.y)):
-                if not abs(now.y[k]) < INFINITY:
-                    bad = end
-    return bad
+                now.y[k] = w.scratch.y_new[k]
+                now.f[k] = w.scratch.f_new[k]
+    for j in range(size):
+        now.y[j] = y[j]
+    finite = True
+    for k in range(len(slope)):
+        slope[k] = now.f[k]
+        finite = finite and abs(now.y[k]) < INFINITY
+    if traced.every[0] > 0:
+        _put(w, size, c.table[place], group, now.y)
+        c.rows_t[place] = end
+    return finite
 
 
 def _put(w: Lanes, size: int, place: Vector, group: int, y: Vector) -> None:

@@ -16,6 +16,7 @@ from integrators.steps import Vector
 from integrators.tangents.motion import (
     TangentCourse,
     Traced,
+    groups_of,
     margins_in_lanes,
     put_gains,
     put_group,
@@ -65,6 +66,11 @@ def ask(t: float, y: Vector, mode: list[int], p: Traced, jolt: list[int], edges:
     p.machines.ask(t, y, mode, p.functions.p, jolt, edges)
 
 
+def observe(t: float, y: Vector, mode: list[int], signs: Vector, p: Traced, seen: Vector) -> None:
+    """Observe a state."""
+    p.machines.observe(t, y, mode, signs, p.functions.p, seen)
+
+
 def jolts(
     t: float,
     y: Vector,
@@ -88,7 +94,7 @@ def act(edge: int, machine: int, t: float, y: Vector, mode: list[int], p: Traced
     for q in range(len(c.t_t)):
         place[q] = c.t_t[q]
     c.fired += 1
-    for group in range(len(c.moves)):
+    for group in range(groups_of(p)):
         _take_moving(p, group, y, mode)
         p.tangents.act(edge, machine, t, w.now.y, w.mode, p.functions.p, w.t, (w.shared, w.own))
         put_group(p, group)
@@ -98,7 +104,7 @@ def act(edge: int, machine: int, t: float, y: Vector, mode: list[int], p: Traced
 def tick(bits: int, t: float, y: Vector, mode: list[int], p: Traced) -> None:
     """Let something tick, and the tangents with it."""
     w = p.lanes
-    for group in range(len(p.course.moves)):
+    for group in range(groups_of(p)):
         _take_moving(p, group, y, mode)
         p.tangents.tick(bits, t, w.now.y, w.mode, p.functions.p, w.t, (w.shared, w.own))
         put_group(p, group)
@@ -160,7 +166,7 @@ def fix(on: Held, mode: list[int]) -> None:
     if len(on.sliding.which) > 0 and on.sliding.count > 0:
         _onto(on, mode)
     if traced.locks[0] > 0:
-        for group in range(len(c.moves)):
+        for group in range(groups_of(traced)):
             take_group(traced, group, c.y)
             p = traced.functions.p
             traced.tangents.follow(c.t, w.now.y, mode, c.held, p, w.t, (w.shared, w.own))
@@ -183,7 +189,7 @@ def _onto(on: Held, mode: list[int]) -> None:
         c.armed[r] = 0
     for r in range(count):
         c.armed[sliding.surfaces.above[sliding.which[r]]] = 1
-    for group in range(len(c.moves)):
+    for group in range(groups_of(traced)):
         take_group(traced, group, c.y)
         slide_in_lanes(on, c.t, w.now.y, mode, w.now.f)
         p, numbers = traced.functions.p, (w.shared, w.own)

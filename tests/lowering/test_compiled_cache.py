@@ -28,7 +28,7 @@ from gms_fsm.foundation.store import CodeFolder
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.program import lower
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.recording import compiled_run
+from gms_fsm.run.recording import compiled_run, ready_code
 from integrators import elementary, loop, step_size
 from integrators.machine_code import calls
 from integrators.machine_code.front_end import statements
@@ -309,7 +309,7 @@ def _name(rig: Prescribed = OPEN_LOOP, elements: int = 4, **options: Any) -> str
     model = ChartModel(stick_slip("signed").chart, values, n=elements, stribeck=CURVE)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compiled, "store", lambda: store)
-        patch.setattr(compiled_run, "_known", {})
+        patch.setattr(ready_code, "_known", {})
         with pytest.raises(LookupError):
             simulate(model, rig, 1.0, engine="compiled", **options)
     return store.asked[0]
@@ -370,7 +370,7 @@ def test_what_was_compiled_at_once_is_replaced_where_it_takes_time_and_has_the_s
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(compiled, "store", lambda: CodeFolder.at(tmp_path))
-    monkeypatch.setattr(compiled_run, "_known", {})
+    monkeypatch.setattr(ready_code, "_known", {})
 
     def kinds() -> list[bool]:
         return sorted(path.name.endswith("-at-once") for path in _kept(tmp_path))
@@ -384,7 +384,7 @@ def test_what_was_compiled_at_once_is_replaced_where_it_takes_time_and_has_the_s
     monkeypatch.setattr(calls, "AT_ONCE", 0.0)
     assert run() == first
     assert kinds() == [False, True]
-    monkeypatch.setattr(compiled_run, "_known", {})
+    monkeypatch.setattr(ready_code, "_known", {})
     path = next(each for each in _kept(tmp_path) if each.name.endswith("-at-once"))
     path.unlink()
     assert run() == first
@@ -395,7 +395,7 @@ def test_what_repeats_a_run_is_compiled_when_a_run_is_repeated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(compiled, "store", lambda: CodeFolder.at(tmp_path))
-    monkeypatch.setattr(compiled_run, "_known", {})
+    monkeypatch.setattr(ready_code, "_known", {})
     prepared = prepare(stick_slip("signed"), OPEN_LOOP, 31.0)
     assert not _kept(tmp_path)
     end = prepared.end()

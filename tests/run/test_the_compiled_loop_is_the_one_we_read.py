@@ -32,7 +32,7 @@ from gms_fsm import (
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.observing import on_surfaces
 from gms_fsm.lowering.program import lower
-from gms_fsm.run.recording import compiled_run
+from gms_fsm.run.recording import compiled_run, ready_code
 from gms_fsm.traces import observed
 from integrators.loop import FIRING, Machines
 from integrators.machine_code.layout import BlockLayout
@@ -50,7 +50,8 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     returned = []
     machine = integrators.runners.compiled
 
-    def engine(program: Any, run: Any, counting: Any) -> Any:
+    def engine(program: Any, run: Any, counting: Any, *tangents: Any) -> Any:
+        assert not any(tangents)
         inside = machine._longest(run) <= machine.LONGEST_INSIDE
         return SimpleNamespace(layout=BlockLayout(run, machine.is_known, inside=inside))
 
@@ -78,7 +79,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         return table
 
     monkeypatch.setattr(compiled, "engine", engine)
-    monkeypatch.setattr(compiled_run, "_known", {})
+    monkeypatch.setattr(ready_code, "_known", {})
     monkeypatch.setattr(compiled_run.Columns, "run", run)
     monkeypatch.setattr(observed, "observe_rows", observe_rows)
     return returned

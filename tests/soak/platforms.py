@@ -30,7 +30,7 @@ from gms_fsm.app.scenario import load_scenario
 from gms_fsm.exporters._quantities import outputs_of
 from gms_fsm.lowering import compiling
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.recording import compiled_run
+from gms_fsm.run.recording import ready_code
 from gms_fsm.systems.signals import Function
 from gms_fsm.systems.system import system_of
 from integrators.machine_code import calls
@@ -145,7 +145,7 @@ def in_c(compiler: str, level: str, warnings: Sequence[str] = ("-w",)) -> Iterat
             mock.patch.object(compiled, "_object", shared),
             mock.patch.object(compiled, "Library", CLibrary),
             mock.patch.object(calls, "Library", CLibrary),
-            mock.patch.object(compiled_run, "_known", {}),
+            mock.patch.object(ready_code, "_known", {}),
             mock.patch.object(compiling, "_observers", {}),
         ):
             yield texts

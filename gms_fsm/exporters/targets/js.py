@@ -31,8 +31,8 @@ from gms_fsm.lowering.adapting import OF_A_RUN, Adapting, adapt
 from gms_fsm.lowering.compiling import packed
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.problem import LATEST, Problem
-from gms_fsm.run.recording.compiled_run import example_of
 from gms_fsm.run.recording.following import adapting_of
+from gms_fsm.run.recording.ready_code import example_of
 from gms_fsm.run.stepped.failing import FAILURES
 from gms_fsm.systems.signals import Function
 from integrators import hybrid, loop

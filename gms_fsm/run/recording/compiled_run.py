@@ -9,17 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.errors import SignalError
+from gms_fsm.gradients.directions import Directions
+from gms_fsm.gradients.sensitivities import Sensitivities
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.log_columns import LOG_NUMBERS, LogRecord
-from gms_fsm.lowering.printing.counting import Counting
 from gms_fsm.lowering.program import equations
 from gms_fsm.run.machines import Interference, MachineEngine
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.counted import CountTables, of_every_step
-from gms_fsm.run.recording.following import following_of
 from gms_fsm.run.recording.moment import Place, Recording
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
+from gms_fsm.run.recording.ready_code import ready_code, tangents_of
 from gms_fsm.run.recording.recording import check_end, explained, interference_error
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces.failures import SimulationError
@@ -30,8 +32,8 @@ from integrators import hybrid, loop
 from integrators.loop import Memory
 from integrators.machine_code.records import arrays_of, put_numbers
 from integrators.runners import states
-from integrators.runners.columns import LogColumns, Recorded, RowTally
-from integrators.sliding import Functions, Sliding
+from integrators.runners.columns import LogColumns, RowTally
+from integrators.sliding import Sliding
 from integrators.steps import Now
 
 if TYPE_CHECKING:
@@ -55,6 +57,8 @@ class CompiledRun:
         With the user's own machines: each firing is replayed through them.
     tables : CountTables, optional
         Where every step's row is counted; such a run keeps only its end.
+    wanted : Directions, optional
+        By what it is differentiated while it runs.
     """
 
     def __init__(
@@ -62,9 +66,10 @@ class CompiledRun:
         start: Problem,
         machines: MachineEngine | None = None,
         tables: CountTables | None = None,
+        wanted: Directions | None = None,
     ) -> None:
         self.start = start
-        self.columns = Columns(start, tables=tables)
+        self.columns = Columns(start, tables=tables, wanted=wanted)
         self.recorder: Recording = self.columns
         self.engine = machines
         self.next_look = PATIENCE
@@ -155,6 +160,8 @@ class Columns:
         Parameters that replace the program's own.
     tables : CountTables, optional
         Where rows are counted.
+    wanted : Directions, optional
+        By what the run is differentiated.
     """
 
     def __init__(
@@ -162,12 +169,16 @@ class Columns:
         start: Problem,
         p: compiled.Packed | None = None,
         tables: CountTables | None = None,
+        wanted: Directions | None = None,
     ) -> None:
         start = start if tables is None else of_every_step(start)
+        self.tangents = None if wanted is None else tangents_of(start, wanted)
         self.start, self.tables = start, tables
         layout = start.program.layout
         size, modes = layout.y.size, layout.modes
-        self.prepared = _prepared(start, None if tables is None else tables.counting)
+        self.prepared = ready_code(
+            start, None if tables is None else tables.counting, self.tangents
+        )
         self.engine, self.block = self.prepared.engine, self.prepared.block()
         # A method __del__ would run while the interpreter ends, too, where modules are emptied.
         weakref.finalize(self, self.prepared.take_back, self.block).atexit = False
@@ -200,9 +211,12 @@ class Columns:
         log.rows_microstep, log.rows_mode = rows_microstep, rows_mode
         log.stops_t, log.stops_microstep = stops_t, stops_microstep
         log.stops_y, log.stops_mode = stops_y, stops_mode
+        if self.tangents:
+            self.tangents.place(self._traced)
         self.packed: tuple[Rows, ...] = ()  # those before the rows in the columns
         self.handed_out = False  # whether a trace has the columns of rows, and not a copy
         self._begin()
+        self._make_room_for_tangents()
         if stops:
             self.log.stops_t[0], self.log.stops_y[0] = start.t_start, self.buffers.now.y
             self.log.stops_mode[0] = list(layout.not_sliding(start.mode))
@@ -216,9 +230,19 @@ class Columns:
 
     def write(self) -> None:
         """Write everything that machine code reads into the block."""
-        places: Any = self.run_of.functions.p
+        places = self.numbers
         places[0][...], places[1][...] = self.p[:2]
         self.place()
+
+    @property
+    def numbers(self) -> Any:
+        """Where the numbers of the system are in the block."""
+        return self._traced.functions.p if self.tangents else self.run_of.functions.p
+
+    @property
+    def _traced(self) -> Any:
+        """What functions with tangents have as parameters."""
+        return self.run_of.functions.p
 
     def place(self) -> None:
         """Write where the columns are, and all numbers except those of the system."""
@@ -230,9 +254,11 @@ class Columns:
 
     def _filled(self) -> RecordArguments:
         """Return what the block is to contain, except for the numbers of the system."""
-        functions = self.run_of.functions
+        functions, p = self.run_of.functions, (*self.numbers[:2], self.p[2])
+        if self.tangents:
+            p = self._traced._replace(functions=self._traced.functions._replace(p=p))
         return self.run_of._replace(
-            functions=functions._replace(p=(*functions.p[:2], self.p[2])),
+            functions=functions._replace(p=p),
             buffers=self.buffers,
             tally=self._tally(),
         )
@@ -257,6 +283,20 @@ class Columns:
         start = self.start
         floor = start.options.floor or start.options.atol
         states.begin(self.buffers, start.t_start, start.y, start.mode, start.last, floor)
+        if self.tangents:
+            self.begin_tangents(self.tangents.directions.scales)
+
+    def begin_tangents(self, scales: FloatArray) -> None:
+        """Put tangents at the start, where the state is."""
+        assert self.tangents is not None
+        start, y = self.start, self.buffers.now.y
+        self.tangents.begin(self._traced.course, start.t_start, y, start.last, scales)
+
+    def derived(self) -> Sensitivities | None:
+        """Return the derivatives of a run that has reached its end."""
+        if self.tangents is None:
+            return None
+        return Sensitivities(self.tangents.directions, self.tangents.followed(self._traced.course))
 
     def empty(self) -> None:
         """Empty the columns and return to the start."""
@@ -336,6 +376,14 @@ class Columns:
             self.make_room_for_firings()
         if 0 < len(log.stops_t) <= log.stops:
             _double(log, "stops_t", "stops_microstep", "stops_y", "stops_mode")
+        self._make_room_for_tangents()
+
+    def _make_room_for_tangents(self) -> None:
+        """Lengthen the columns of tangents: as many rows and firings as in those of the run."""
+        if self.tangents:
+            out, log = self.buffers.out, self.log
+            rows, firings = len(out.rows_t) - out.row, len(log.t) - log.firings
+            self.tangents.make_room(self._traced.course, rows + 1, firings)
 
     def make_room_for_firings(self) -> None:
         """Double the columns of the log."""
@@ -463,48 +511,6 @@ class Columns:
                 log.stops_mode,
             )
         return rows, stops, self.fired()
-
-
-_known: dict[Any, compiled.ReadyCode] = {}
-
-
-def _prepared(start: Problem, counting: Counting | None) -> compiled.ReadyCode:
-    """Return what a run has in common with others: what moves, the method, and the sizes."""
-    program = start.program
-    flow = "flow" if start.options.located else "flow_live"
-    key = id(program.functions), flow, start.options.method, counting is not None
-    if (ready := _known.get(key)) is None:
-        if len(_known) >= compiled.MOST_ENGINES:
-            _known.clear()
-        run = example_of(start, counting)._replace(more=following_of(start))
-        engine = compiled.engine(program, run, counting)
-        _known[key] = ready = compiled.ReadyCode(engine, run, program.functions)
-    return ready
-
-
-def example_of(start: Problem, counting: Counting | None = None) -> RecordArguments:
-    """Return the arguments of `integrators.runners.columns.record`, with columns that may grow."""
-    from integrators.runners.compiled import example
-
-    program, layout = start.program, start.program.layout
-    flow = "flow" if start.options.located else "flow_live"
-    made = compiled.functions(program)
-    p: Any = compiled.packed(program.p)
-    return example(
-        Functions(made[flow], made["arm"], made["margins"], made["normal"], made["follow"], p),
-        loop.Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
-        hybrid.buffers(
-            equations(program), start.t_start, start.y, start.mode, start.last, start.options, 0
-        ),
-        layout.observed.size,
-        Recorded(*map(_integers, layout.recorded)),
-        layout.modes,
-        None if counting is None else compiled.count_of(program, counting),
-    )
-
-
-def _integers(numbers: Any) -> Any:
-    return np.array(numbers, dtype=np.int64)
 
 
 def _empty_rows(rows: int, size: int, modes: int) -> tuple[Any, Any, Any, Any]:

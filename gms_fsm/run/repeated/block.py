@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gms_fsm.gradients.directions import Directions, scales_of
 from gms_fsm.lowering.compiling import packed, with_more
 from gms_fsm.lowering.program import Arguments
 from gms_fsm.run.problem import Problem
@@ -54,8 +55,13 @@ STEPS = 100_000  # of one run between two others
 class RepeatedRun:
     """A run whose columns, machine code and plan serve again and again, in one thread at a time."""
 
-    def __init__(self, start: Problem, tables: CountTables | None = None) -> None:
-        self.columns = columns = Columns(start, tables=tables)
+    def __init__(
+        self,
+        start: Problem,
+        tables: CountTables | None = None,
+        wanted: Directions | None = None,
+    ) -> None:
+        self.columns = columns = Columns(start, tables=tables, wanted=wanted)
         run, layout = columns.run_of, columns.block.layout
         more: Any = run.more.adapting
         more.chosen[:] = start.chosen_tolerances()
@@ -63,16 +69,16 @@ class RepeatedRun:
         more.span[:] = start.t_start, start.last
         run.more.repeats.scale[0] = layout.offset("buffers.plan.control.time_scale")
         columns.write()
-        self.shared: Any = run.functions.p[0]
-        self.own: Any = run.functions.p[1]
+        self.shared, self.own = columns.numbers[:2]
         self.scale = layout.offset("buffers.plan.control.time_scale")
         self.floats = columns.block.words.view(float)
         self.first = columns.block.copy()
         call = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)
-        library = with_more(columns.engine)
+        library = with_more(columns.engine, alone=wanted is not None)
         self._adapt: Any = call(library.address("adapt"))
-        several = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, *[ctypes.c_int64] * 3)
-        self._repeat: Any = several(library.address("repeat"))
+        if wanted is None:
+            several = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, *[ctypes.c_int64] * 3)
+            self._repeat: Any = several(library.address("repeat"))
 
     def put(self, numbers: Iterable[tuple[Place, Any]]) -> None:
         """Return to the start, with some other numbers."""
@@ -110,6 +116,9 @@ class RepeatedRun:
         self.floats[self.scale] = self._adapt(columns.block.address)
         if len(columns.log.stops_t):
             columns.log.stops_y[0] = columns.buffers.now.y
+        if columns.tangents is not None:
+            moved = columns.tangents.directions
+            columns.begin_tangents(scales_of(moved, columns.numbers, columns.buffers.now.y))
 
     def run(self, start: Callable[[], Problem]) -> bool:
         """Run to the end; False if it stops before, for a reason that a run of its own gives.

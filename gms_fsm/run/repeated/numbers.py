@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gms_fsm.charts.parameters import Bound, bounds_of
 from gms_fsm.foundation.arguments import unknown
+from gms_fsm.gradients.directions import Directions
 from gms_fsm.language import Value, names_in
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.repeated.block import Place, RepeatedRun
@@ -106,8 +107,8 @@ class NumberCells(NamedTuple):
 class RepeatedRuns:
     """Runs that wait to be repeated, and where the numbers are in them."""
 
-    def __init__(self, start: Problem) -> None:
-        self.start, self.repeatable = start, is_repeatable(start)
+    def __init__(self, start: Problem, wanted: Directions | None = None) -> None:
+        self.start, self.wanted, self.repeatable = start, wanted, is_repeatable(start)
         self.spare = list[RepeatedRun]()
 
     @functools.cached_property
@@ -141,7 +142,7 @@ class RepeatedRuns:
         try:
             return self.spare.pop()
         except IndexError:
-            return RepeatedRun(self.start)
+            return RepeatedRun(self.start, wanted=self.wanted)
 
     def cells(self, given: Mapping[str, NDArray[np.float64]]) -> NumberCells | None:
         """Return the numbers of many runs, shapes as for a sweep; None if some cannot be put."""

@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.foundation.arguments import later, refusing
-from gms_fsm.gradients.directions import scales_of
-from gms_fsm.gradients.linear import Directions
+from gms_fsm.gradients.directions import Directions
 from gms_fsm.run.problem import Problem
-from gms_fsm.run.recording.compiled_run import CompiledRun
 from gms_fsm.run.repeated.numbers import RepeatedRuns, problem_with, with_given
 from gms_fsm.run.settings import SettingOptions, Settings
-from gms_fsm.run.simulate import Run, asked_for, derived
+from gms_fsm.run.simulate import asked_for, simulated
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import Mounted, arguments_of, mounted
 from gms_fsm.systems.rigs import Rig
@@ -141,14 +139,13 @@ class Prepared:
         if run is None:
             return self._alone(given, start.chosen, self.wanted)
         contents = run.taken()
+        slopes = run.columns.derived()
         self._all.take_back(run)
-        if self.wanted is not None:
-            now = problem_with(start, given)
-            scales = scales_of(self.wanted, now.program, now.y)
-            found, by = now.trace(*contents()), replace(self.wanted, scales=scales)
-            return replace(found, derived=derived(now, by, len(found.rows)))
         made: Trace = later(
-            Trace, lambda: problem_with(start, given).trace(*contents()), initial=start.initial
+            Trace,
+            lambda: replace(problem_with(start, given).trace(*contents()), derived=slopes),
+            initial=start.initial,
+            derived=slopes,
         )
         return made
 
@@ -197,7 +194,7 @@ class Prepared:
 
     @functools.cached_property
     def _all(self) -> RepeatedRuns:
-        return RepeatedRuns(self.start)
+        return RepeatedRuns(self.start, self.wanted)
 
     @functools.cached_property
     def _ends(self) -> RepeatedRuns:
@@ -213,13 +210,7 @@ class Prepared:
     ) -> Trace:
         """Run as `simulate` does, from new: numbers that change the program, and errors."""
         start = self._again(with_given(self.start.what, given), chosen)
-        run = CompiledRun(start) if chosen.engine == "compiled" else Run(start)
-        while run.advance():
-            pass
-        trace = run.recorder.trace()
-        if wanted is not None and (now := asked_for(start, wanted.names)) is not None:
-            trace = replace(trace, derived=derived(start, now, len(trace.rows)))
-        return trace
+        return simulated(start, wanted=None if wanted is None else asked_for(start, wanted.names))
 
 
 def _own(given: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.lowering import compiling as compiled
-from gms_fsm.lowering.program import equations
+from gms_fsm.lowering.program import equations, machines_of
 from gms_fsm.run.machines import IfElse
 from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.ticks import EXACT, clocks_of, in_units
@@ -258,6 +258,6 @@ def arguments_of(start: Problem, *, waits: bool = False) -> Any:
     p: Any = compiled.packed(start.program.p)
     return StepArguments(
         Functions(made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p),
-        Machines(made["switch"], made["act"], made["tick"], made["jolts"], made["observe"]),
+        machines_of(made),
         *prepared(start, waits=waits),
     )

@@ -419,9 +419,13 @@ def _record(work: Work, cls: Any, node: ast.Call) -> Value:
     """Return a new tuple; its numbers keep their present values."""
     names = [*cls._fields[: len(node.args)], *(str(each.arg) for each in node.keywords)]
     nodes = [*node.args, *(each.value for each in node.keywords)]
-    if sorted(names) != sorted(cls._fields):
+    fields: dict[str, Value] = {
+        name: FixedValue(given)
+        for name, given in cls._field_defaults.items()
+        if name not in names and callable(given)
+    }
+    if sorted([*names, *fields]) != sorted(cls._fields):
         raise work.error(f"{cls.__name__} takes {', '.join(cls._fields)}")
-    fields: dict[str, Value] = {}
     for name, part in zip(names, nodes, strict=True):
         made = value(work, part)
         fields[name] = made if isinstance(part, ast.Attribute) else steady(work, made)
