@@ -208,16 +208,11 @@ def refuse_functions(model_or_system: object) -> None:
         )
 
 
-def same_text(one: System, other: System) -> bool:
-    """Return whether two systems differ in numbers only, and none of these is written in the text.
+def structure(system: System) -> tuple[Any, ...]:
+    """Return everything that the text of a system depends on, in hashable form.
 
     A Stribeck exponent of 2, and a number that is 0, give another text than others.
     """
-    return structure(one) == structure(other)
-
-
-def structure(system: System) -> tuple[Any, ...]:
-    """Return everything that the text of a system depends on, in hashable form."""
     spelled = tuple(map(_spelling, system.signals.values()))
     # A ratio that is 1 or 0 is left out of no text; an inertia that is not positive is refused.
     zeros = tuple(name for name, value in system.numbers.items() if value == 0.0)

@@ -222,21 +222,19 @@ class Problem:
             initial=initial,
         )
 
-    def with_numbers(self, what: Mounted, initial: Mapping[str, Any] | None = None) -> Problem:
-        """Return the same start with different numbers, and initial values if given."""
-        initial = self.initial if initial is None else initial
+    def with_numbers(self, what: Mounted) -> Problem:
+        """Return the same start with different numbers."""
         program = replace(self.program, p=arguments(what.system))
         scales = scales_of_system(program)
         default = scales.tolerances(self.options.rtol)
         tolerances, used = _tolerances(self.program.layout, self.chosen.atol, default)
-        y, _ = _initial(what, program, self.t_start, initial)
+        y, _ = _initial(what, program, self.t_start, self.initial)
         floor = _floor(what.system, program, tolerances, (self.t_start, self.last), y, self.mode)
         return replace(
             self,
             what=what,
             program=program,
             y=y,
-            initial=initial,
             options=replace(
                 self.options,
                 atol=tolerances,

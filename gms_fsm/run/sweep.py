@@ -21,7 +21,6 @@ from gms_fsm.foundation.arguments import checked_kind, meant, refusing, unknown
 from gms_fsm.gradients.directions import INITIAL
 from gms_fsm.lowering.compiling import check_llvmlite
 from gms_fsm.lowering.printing.counting import Counting, counting_of
-from gms_fsm.lowering.program import same_text
 from gms_fsm.run._swept import LOG, LONGEST, Sweep
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import CompiledRun
@@ -353,7 +352,6 @@ def _each(
 ) -> dict[int, RunResult]:
     """Make runs one by one: with numbers that are another program, or that may be refused."""
     results: dict[int, RunResult] = {}
-    compiled: CompiledRun | None = None
     known, signals = known_in(what), signals_of(what)
     driven = [name for name in part if name in signals]
     others = [name for name in part if name not in known and name not in signals]
@@ -373,20 +371,9 @@ def _each(
             if first is not None:
                 given = {name: values[name] for name in others if name not in periods}
                 begun = with_initial(first, given)
-            if (
-                compiled is not None
-                and not periods
-                and not driven
-                and same_text(compiled.start.system, its.system)
-            ):
-                compiled.reset(its, begun)  # the same buffers and machine code
-                run = compiled
-            elif begin.settings.engine == "compiled":
-                run = compiled = CompiledRun(begin.start(its, begun), tables=tables)
-                if compiled.start.program.plan.steps:  # the numbers say at which times it stops
-                    compiled = None
-            else:
-                run = Run(begin.start(its, begun), tables=tables)
+            start = begin.start(its, begun)
+            made = CompiledRun if begin.settings.engine == "compiled" else Run
+            run = made(start, tables=tables)
             while run.advance():
                 pass
         except GMSError as error:

@@ -23,14 +23,13 @@ from gms_fsm.run.recording.moment import Place, Recording
 from gms_fsm.run.recording.pace import LATER, PATIENCE, check_pace
 from gms_fsm.run.recording.ready_code import ready_code, tangents_of
 from gms_fsm.run.recording.recording import check_end, explained, interference_error
-from gms_fsm.systems.mounted import Mounted
 from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.firings import Firings
 from gms_fsm.traces.rows import Rows, joined, packed
 from gms_fsm.traces.trace import Trace
 from integrators import hybrid, loop
 from integrators.loop import Memory
-from integrators.machine_code.records import arrays_of, put_numbers
+from integrators.machine_code.records import arrays_of
 from integrators.runners import states
 from integrators.runners.columns import LogColumns, RowTally
 from integrators.sliding import Sliding
@@ -98,12 +97,6 @@ class CompiledRun:
             if memory.phase == loop.FIRE:  # its callbacks have run, the loop has yet to fire
                 _, edge = self.start.edge(memory.machine, memory.edge)
                 self.engine.set_state(memory.machine, edge.target)
-
-    def reset(self, what: Mounted, initial: Mapping[str, Any] | None = None) -> None:
-        """Start over with different numbers, and initial values if given; signals stay."""
-        self.columns.reset(what, initial)
-        self.start = self.columns.start
-        self.next_look = PATIENCE
 
     def advance(self) -> bool:
         """Run until a chunk of steps is complete."""
@@ -272,12 +265,6 @@ class Columns:
         near: Any = self.tables.near
         return tally._replace(counts=counts, near=near)
 
-    def reset(self, what: Mounted, initial: Mapping[str, Any] | None = None) -> None:
-        """Empty the columns and return to the start, with other numbers and initial values."""
-        self.start = self.start.with_numbers(what, initial)
-        self.p = compiled.packed(self.start.program.p)
-        self.empty()
-
     def _begin(self) -> None:
         """Write the start into the buffers, which are otherwise as they were at the beginning."""
         start = self.start
@@ -297,36 +284,6 @@ class Columns:
         if self.tangents is None:
             return None
         return Sensitivities(self.tangents.directions, self.tangents.followed(self._traced.course))
-
-    def empty(self) -> None:
-        """Empty the columns and return to the start."""
-        if self.handed_out:
-            self.replace_rows()
-        self.packed = ()
-        start, log = self.start, self.log
-        b: Any = self.buffers  # arrays
-        memory, sliding = b.memory, b.sliding
-        for record, names in ((memory, states.COUNTS), (b.out, states.CURSOR)):
-            put_numbers(record, names, [0] * len(names))
-        sliding.count = 0
-        for counts in (
-            memory.switches,
-            memory.changes,
-            memory.was,
-            memory.jolt,
-            b.relations.watch,
-            sliding.which,
-            sliding.flags,
-            sliding.arrived,
-        ):
-            counts[:] = 0
-        self._begin()
-        sliding.live[:] = start.program.live
-        b.plan.control.atol[:] = start.options.atol
-        b.plan.relaxing[:] = hybrid.relaxation_times(start.options)
-        control = b.plan.control._replace(time_scale=start.options.time_scale)
-        self.buffers = b._replace(plan=b.plan._replace(control=control))
-        log.firings, log.stops = 0, min(1, len(log.stops_t))
 
     def replace_rows(self) -> None:
         """Leave the columns of rows to the trace that has them."""
