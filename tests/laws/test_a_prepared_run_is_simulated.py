@@ -193,6 +193,8 @@ def test_its_derivatives_are_those_of_simulate(engine: str) -> None:
 def test_ctrl_c_in_a_shared_block_leaves_the_part_before(
     monkeypatch: pytest.MonkeyPatch, in_one_block: Callable[[bool], None]
 ) -> None:
+    pytest.importorskip("llvmlite", reason="a block is one of machine code")
+
     def stopped(run: RepeatedRun) -> None:
         raise KeyboardInterrupt
 
