@@ -168,7 +168,7 @@ def simulate(
     what = mounted(model, on, chosen.held_period)
     special = initial, machines, progress, path, until, monitors or None, wish or None
     like = runs_like(what, t_start, end, chosen, special)
-    if like is not None and (again := like.trace(what, chosen)) is not None:
+    if like is not None and (again := like.trace(what)) is not None:
         return again
     start = Problem.on(what, end, chosen, t_start=t_start, initial=initial)
     watching = checked(monitors, start.what, start.output).values() if monitors else ()

@@ -37,7 +37,7 @@ class RunsOfOneText:
     alone: int = 0  # how many were runs of their own
     runs: RepeatedRuns | None = None
 
-    def trace(self, what: Mounted, chosen: Settings) -> Trace | None:
+    def trace(self, what: Mounted) -> Trace | None:
         """Return the run with the numbers of a system; None if it must be a run of its own."""
         if self.runs is None or not self.runs.repeatable:
             return None
@@ -45,13 +45,13 @@ class RunsOfOneText:
         p = arguments(what.system)
         run.put_all(p)
         run.follow()
+        solved = _with_numbers(start, what, p, run)
         try:
-            done = run.run(lambda: Problem.on(what, start.t_end, chosen, t_start=start.t_start))
+            done = run.run(lambda: start.with_numbers(what))
         except KeyboardInterrupt as error:
-            part = _with_numbers(start, what, p, run).trace(*run.columns.contents())
-            error.trace = part  # type: ignore[attr-defined]
+            error.trace = solved.trace(*run.columns.contents())  # type: ignore[attr-defined]
             raise
-        found = _with_numbers(start, what, p, run).trace(*run.taken()()) if done else None
+        found = solved.trace(*run.taken()()) if done else None
         if run.size < LARGE:
             self.runs.take_back(run)
         return found
@@ -80,7 +80,7 @@ def runs_like(
 
 
 def _with_numbers(start: Problem, what: Mounted, p: Arguments, run: RepeatedRun) -> Problem:
-    """Return what a trace needs of the problem that a run has solved."""
+    """Return what a trace needs of the problem that a run solves."""
     used: Any = run.columns.buffers.plan.control.atol
     atol = start.program.layout.labelled(used.tolist())
     settings = start.settings if start.chosen.atol else {**start.settings, "atol": atol}
