@@ -1,7 +1,7 @@
 "use strict";
 // The plots over time, of one run or of two in the same plots. All share one time axis, a cursor at the row shown and a
 // crosshair under the mouse; the head of each plot tells its value at the crosshair, or else at the cursor.
-const AXIS = 58, GAP = 10, TIME_AXIS = 20; // px to the left and to the right of the plots, and below them
+const AXIS = 58, GAP = 16, TIME_AXIS = 20; // px to the left and to the right of the plots, and below them
 const LEAST = 46, PRESENTED = 30, BARE = 14; // px, of a plot, of one in a presentation, and of one that is an axis only
 const DASHES = [[], [7, 4], [2, 3], [8, 3, 2, 3], [12, 4], [4, 2, 1, 2, 1, 2]];
 const COLOURS = 7, STATES = 5; // of the style sheet: --e0 ..., --state0 ...
