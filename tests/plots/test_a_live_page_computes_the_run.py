@@ -226,10 +226,13 @@ def test_while_a_slider_moves_lines_have_the_extremes_of_each_column_of_pixels(l
     drawn = """() => views[0].open.right.plots.map(({ plot }) =>
         plot.data.slice(1).filter((_, k) => plot.series[k + 1].show).map((u) =>
             [u.length, ...[Math.min, Math.max].map((of) => of(...u.filter(Number.isFinite)))]))"""
-    page.evaluate("turn(dials.get('F_s'), 1.1 * dials.get('F_s').value)")
-    wait(page, "first.frame !== null && sketching")
-    page.evaluate("chooseElement(2)")  # of the base run its line alone is shown
-    sketched, width = page.evaluate(drawn), page.evaluate("views[0].open.right.width()")
+    # In one task of the page: the sketch ends by itself. Of the base run one line alone is shown.
+    sketched, width = page.evaluate(f"""async () => {{
+        turn(dials.get('F_s'), 1.1 * dials.get('F_s').value);
+        while (first.frame === null || !sketching) await new Promise(requestAnimationFrame);
+        chooseElement(2);
+        return [({drawn})(), views[0].open.right.width()];
+    }}""")
     wait(page, "!sketching")
     whole, frames = page.evaluate(drawn), page.evaluate("frames.t.length")
     assert all(0 < each[0] <= 2 * (width + 1) < frames for lines in sketched for each in lines)
