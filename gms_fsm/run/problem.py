@@ -16,6 +16,7 @@ from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, chec
 from gms_fsm.errors import ParameterError, SignalError, keyed, shown
 from gms_fsm.foundation.arguments import there_are, unknown
 from gms_fsm.foundation.equality import ByIdentity
+from gms_fsm.gradients.sensitivities import Sensitivities
 from gms_fsm.lowering.floor import floor_of
 from gms_fsm.lowering.layout import BankPlaces, SystemLayout
 from gms_fsm.lowering.log_columns import LogRecord
@@ -107,9 +108,12 @@ class Problem:
         }
         return _tolerances(layout, self.chosen.atol, none)[0]
 
-    def trace(self, rows: Rows, stops: Rows, firings: Firings) -> Trace:
+    def trace(
+        self, rows: Rows, stops: Rows, firings: Firings, derived: Sensitivities | None = None
+    ) -> Trace:
         """Return the trace of a run."""
-        trace = Trace(rows, stops, firings, self.what, self.settings, initial=self.initial)
+        more: Any = {"initial": self.initial, "derived": derived}
+        trace = Trace(rows, stops, firings, self.what, self.settings, **more)
         vars(trace)["program"] = self.program  # it need not be generated again
         return trace
 

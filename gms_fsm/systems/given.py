@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gms_fsm.systems.parts import Body
 
 ZERO = Number(0.0)
+WORDS = {*FUNCTIONS, *CONSTANTS, "pow"} - {*YIELDING}  # of the language
 Text: TypeAlias = str | float  # an expression, or just a number
 
 
@@ -83,7 +84,7 @@ def check_name(name: object, place: str, key: tuple[str | int, ...] = ()) -> Non
             advice="use letters, digits and _, not starting with a digit, and no Python keyword",
             key=key,
         )
-    if name in {*FUNCTIONS, *CONSTANTS, "pow"} - {*YIELDING}:
+    if name in WORDS:
         raise ParameterError(f"the name {name!r} is a word of the language", place=place, key=key)
 
 

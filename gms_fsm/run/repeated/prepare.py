@@ -143,7 +143,7 @@ class Prepared:
         self._all.take_back(run)
         made: Trace = later(
             Trace,
-            lambda: replace(problem_with(start, given).trace(*contents()), derived=slopes),
+            lambda: problem_with(start, given).trace(*contents(), slopes),
             initial=start.initial,
             derived=slopes,
         )
