@@ -162,6 +162,6 @@ def adapter() -> Iterator[DapClient]:
 
 def process() -> subprocess.Popen[bytes]:
     """Start `gms-fsm dap`."""
-    command = [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", "dap"]
+    command = [sys.executable, "-m", "gms_fsm", "dap"]
     pipe = subprocess.PIPE
     return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL)

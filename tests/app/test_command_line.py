@@ -127,8 +127,7 @@ def test_usage_errors_and_terminal_codes(broken: CommandLine) -> None:
 @pytest.mark.parametrize("debug", matrix([False, True], [False]))
 def test_in_a_shell(debug: bool, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", "from gms_fsm.app.cli import main; main()", "run", "none.toml"]
-        + ["--debug"] * debug,
+        [sys.executable, "-m", "gms_fsm", "run", "none.toml"] + ["--debug"] * debug,
         capture_output=True,
         text=True,
         cwd=tmp_path,

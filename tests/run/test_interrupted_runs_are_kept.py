@@ -101,13 +101,7 @@ LONG = OPEN_LOOP.replace("t_end = 1.0", "t_end = 1e8\nmax_steps = 1_000_000_000"
 
 def test_the_command_line_keeps_the_results_and_says_so(tmp_path: Path) -> None:
     scenario = _file(tmp_path, LONG)
-    command = [
-        sys.executable,
-        "-c",
-        "from gms_fsm.app.cli import main; main()",
-        "run",
-        str(scenario),
-    ]
+    command = [sys.executable, "-m", "gms_fsm", "run", str(scenario)]
     command += ["-o", "out", "--checkpoint", "--set", "run.engine=machines"]
     child = subprocess.Popen(
         command,
