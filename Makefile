@@ -123,19 +123,23 @@ regressions: $(VENV)/bench.stamp
 soak: $(VENV)/dev.stamp
 	$(RUN)/python -m tests.soak --minutes $(SOAK_MINUTES)
 
-# The programs that run the exports; without one of them its checks are skipped, and it is named.
-FOREIGN_PROGRAMS := gcc g++ clang octave-cli node npm plantuml pdflatex pdftotext chromium git autoconf automake flex bison
-FOREIGN_PACKAGES := gcc g++ clang octave nodejs npm plantuml texlive-latex-recommended texlive-pictures poppler-utils \
-    chromium git autoconf automake flex bison
+# The programs that run the exports, with their packages where these have other names; without one of
+# them its checks are skipped, and it is named.
+FOREIGN_PROGRAMS := gcc g++ clang octave-cli:octave node:nodejs npm plantuml pdftotext:poppler-utils \
+    pdflatex:texlive-latex-recommended,texlive-pictures chromium git autoconf automake flex bison
 
-# One check after the other: each writes its rows of tests/foreign/exports.json at the end.
+# One check after the other: each writes its rows of tests/foreign/exports.json at the end. Packages
+# are installed one by one: one that cannot be does not keep out the others.
 foreign: $(VENV)/foreign.stamp
-	@for program in $(FOREIGN_PROGRAMS); do command -v $$program >/dev/null || missing="$$missing $$program"; done; \
+	@for each in $(FOREIGN_PROGRAMS); do command -v $${each%%:*} >/dev/null || missing="$$missing $$each"; done; \
 	if [ -n "$$missing" ] && command -v apt-get >/dev/null && [ "$$(id -u)" = 0 ]; then \
-	    apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $(FOREIGN_PACKAGES) >/dev/null; \
+	    apt-get update -qq; \
+	    for each in $$missing; do \
+	        DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $$(echo $${each##*:} | tr , ' ') >/dev/null; \
+	    done; \
 	fi; \
-	for program in $(FOREIGN_PROGRAMS); do \
-	    command -v $$program >/dev/null || echo "make foreign: $$program is not installed; what needs it is not run"; \
+	for each in $$missing; do \
+	    command -v $${each%%:*} >/dev/null || echo "make foreign: $${each%%:*} is not installed; what needs it is not run"; \
 	done
 	$(RUN)/python -m pytest tests/foreign/check_*.py
 	$(RUN)/python docs/make_exports.py
