@@ -1,9 +1,9 @@
-"""Everything the product refuses, in one table: call, class of the error, place and value.
+"""Everything the product refuses, in one table of calls.
 
-A group makes calls of one kind; a row is what one call is given, behind the end of the place and
-the value that its error must name (... for none). `tests/test_refusals.py` makes the calls and
-compares the messages with `tests/refusals.approved.txt`, which ``python -m tests.refusals`` writes
-anew. A new refusal is a row.
+A group makes calls of one kind; a row is what one call is given. `tests/test_refusals.py` makes the
+calls and compares class, place, value and message of their errors with
+`tests/refusals.approved.txt`, which ``python -m tests.refusals`` writes anew. A new refusal is a
+row.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from contextlib import chdir
 from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -83,21 +83,7 @@ from gms_fsm.charts import CHARTS, gms_element, timetable
 from gms_fsm.charts.registry import Demonstration, Entry, entry
 from gms_fsm.debugger.dap._adapter import Adapter
 from gms_fsm.debugger.dap._wire import read_message
-from gms_fsm.errors import (
-    NOTHING,
-    ChartError,
-    CheckpointError,
-    ExpressionError,
-    OutputError,
-    ParameterError,
-    RecordError,
-    ScenarioError,
-    SessionError,
-    SignalError,
-    TraceFileError,
-    UnitError,
-)
-from gms_fsm.foundation.arguments import LACKING
+from gms_fsm.errors import NOTHING, shown
 from gms_fsm.foundation.quantities import factor
 from gms_fsm.identification.certainty.intervals import Bootstrap
 from gms_fsm.phenomena.results import PhenomenaTable, PhenomenonResult
@@ -105,7 +91,6 @@ from gms_fsm.records import _table, damper, tribometer
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.signals import as_signal
 from gms_fsm.systems.system import with_model
-from gms_fsm.traces.failures import SimulationError
 from gms_fsm.traces.monitors import Chattering, CoverageMonitor, Passivity
 from tests import older_files, own_files, systems_cases
 from tests.corpus import HEALS, run, trace
@@ -131,34 +116,14 @@ LONG = "x" * 50_000
 NAN, INF = np.nan, np.inf
 
 
-class Refusal(NamedTuple):
-    """A call in an empty folder, and the fields of its error."""
-
-    call: Callable[[], object]
-    error: type[GMSError]
-    place: str
-    value: object = NOTHING
+REFUSALS: dict[str, Callable[[], object]] = {}
 
 
-REFUSALS: dict[str, Refusal] = {}
-
-
-def group(
-    what: str,
-    error: type[GMSError],
-    call: Callable[..., object],
-    rows: Mapping[str, Any],
-    place: str | None = None,
-) -> None:
-    """Add rows to the table: place, value (... for none), and what the call is given.
-
-    With a place for all rows, they have only what the call is given.
-    """
+def group(what: str, call: Callable[..., object], rows: Mapping[str, Any]) -> None:
+    """Add rows to the table: what the call is given, as a tuple unless it is one argument."""
     for name, row in rows.items():
-        at, value, *given = row if place is None else (place, ..., *row)
         assert f"{what}: {name}" not in REFUSALS
-        found = NOTHING if value is ... else value
-        REFUSALS[f"{what}: {name}"] = Refusal(partial(call, *given), error, at, found)
+        REFUSALS[f"{what}: {name}"] = partial(call, *(row if isinstance(row, tuple) else (row,)))
 
 
 def refused(call: Callable[[], object]) -> tuple[GMSError | None, set[str]]:
@@ -181,23 +146,22 @@ def called(make: Callable[[], object]) -> object:
     return make()
 
 
-def place_of(error: GMSError) -> str:
-    """Return the place of an error, with all that contains it."""
-    return ": ".join(filter(None, (error.outer, error.place)))
-
-
-def told(error: GMSError) -> str:
-    """Return the message of an error, without the parts of it that vary."""
-    said = str(error).replace("\0", "\\0")
+def told(error: GMSError | None) -> str:
+    """Return the class, place and value of an error, then its message without what varies."""
+    if error is None:
+        return "not refused"
+    at = ": ".join(filter(None, (error.outer, error.place)))
+    value = "" if error.value is NOTHING else f" is {shown(error.value)}"
+    said = f"{type(error).__name__} at {at!r}{value}\n{error}".replace("\0", "\\0")
     for pattern in VARYING:
         said = re.sub(pattern, "...", said)
     return said.replace("\n", "\n    ")
 
 
 def transcript() -> str:
-    """Return the messages of all refusals."""
-    errors = ((name, refused(row.call)[0]) for name, row in REFUSALS.items())
-    return "".join(f"{name}\n    {told(error)}\n" for name, error in errors if error)
+    """Return what is told of all refusals."""
+    found = ((name, told(refused(call)[0])) for name, call in REFUSALS.items())
+    return "".join(f"{name}\n    {said}\n" for name, said in found)
 
 
 @cache
@@ -260,7 +224,7 @@ rows = {
     "no C": (f"{ONE_C}\n", ""),
     "no head of the model": ("[model]\n", ""),
 }
-group("key of a scenario", ScenarioError, edited, rows, "a.toml")
+group("key of a scenario", edited, rows)
 rows = {
     "unknown model": ('"GMS"', '"GSM"'),
     "model in other letters": ('"GMS"', '"gms"'),
@@ -301,63 +265,37 @@ rows = {
     "number of 5000 digits": (END, f"t_end = 1{'0' * 5000}"),
     "number without a digit before the point": ("[100.0, 50.0]", "[100.0, -.5e-3]"),
     "number without a digit behind the point": (END, "t_end = 1. # s"),
+    "row a picosecond": ("figures = []", "every = 1e-12"),
+    "file that cannot be": (QUOTED, SIGNAL % "a\\u0000.csv"),
+    "file of a very long name": (QUOTED, SIGNAL % LONG),
+    "file without a name": (QUOTED, SIGNAL % ""),
+    "file that is missing": (QUOTED, SIGNAL % "b.csv"),
+    "mass of 0": ('"prescribed"\nvelocity =', '"slider"\nmass = 0.0\nforce ='),
+    "expression that ends early": ("sin(t)", "sin(t"),
+    "unknown name": ("sin(t)", "sin(x)"),
+    "name that is an emoji elsewhere": (SIN, ":warning:"),
+    "product without a sign": (SIN, "0.1 sin(2 pi t)"),
+    "function of a module": (SIN, "0.1*math.sin(t)"),
+    "letter for pi": (SIN, "0.1*sin(\u03c0*t)"),
+    "case without a comparison": (SIN, "if(t, 0, 0.1)"),
+    "case without an alternative": (SIN, "if(t < 1, 0.1)"),
+    "program": (QUOTED, """'__import__("os").mkdir("pwned")'"""),
+    "one corner": (QUOTED, "[[0.0, 0.1]]"),
+    "no corner": (QUOTED, "[]"),
+    "ramps that go back in time": (QUOTED, "[[0.0, 0.0], [2.0, 1.0], [1.0, 1.0]]"),
+    "very long expression": (SIN, "t + " * 50_000 + "x"),
+    "deep expression": (SIN, "(" * 5000 + "t" + ")" * 5000),
 }
-group("value of a scenario", ScenarioError, edited, rows, "a.toml")
+group("value of a scenario", edited, rows)
 rows = {
-    "row a picosecond": ("output.every", 1e-12, "figures = []", "every = 1e-12"),
-    "file that cannot be": ("rig.velocity.file", "a\x00.csv", QUOTED, SIGNAL % "a\\u0000.csv"),
-    "file of a very long name": ("rig.velocity.file", LONG, QUOTED, SIGNAL % LONG),
-    "file without a name": ("rig.velocity.file", "", QUOTED, SIGNAL % ""),
-    "file that is missing": ("rig.velocity.file", "b.csv", QUOTED, SIGNAL % "b.csv"),
+    "step under the clock": (END, f"{END}\nmax_step = 1e-18"),
+    "no step for a method without error estimate": (END, f'{END}\nmethod = "rk4"'),
+    "events per step without a step": (END, f'{END}\nevents = "step"'),
+    "too few initial z": ("[output]", "[initial]\nz = [0.0]\n[output]"),
+    "unknown initial state": ("[output]", '[initial]\nstates = ["stick", "slide"]\n[output]'),
+    "initial velocity of a prescribed motion": ("[output]", "[initial]\nv = 0.1\n[output]"),
 }
-group("value of a scenario", ScenarioError, edited, rows)
-rows = {
-    "mass of 0": ("rig.mass", 0.0, '"prescribed"\nvelocity =', '"slider"\nmass = 0.0\nforce ='),
-    "expression that ends early": ("signal, column 8", ..., "sin(t)", "sin(t"),
-    "unknown name": ("signal, column 9", ..., "sin(t)", "sin(x)"),
-    "name that is an emoji elsewhere": ("signal, column 1", ..., SIN, ":warning:"),
-    "product without a sign": ("signal, column 5", ..., SIN, "0.1 sin(2 pi t)"),
-    "function of a module": ("signal, column 5", ..., SIN, "0.1*math.sin(t)"),
-    "letter for pi": ("signal, column 9", ..., SIN, "0.1*sin(\u03c0*t)"),
-    "case without a comparison": ("signal, column 4", ..., SIN, "if(t, 0, 0.1)"),
-    "case without an alternative": ("signal, column 1", ..., SIN, "if(t < 1, 0.1)"),
-    "program": ("signal, column 1", ..., QUOTED, """'__import__("os").mkdir("pwned")'"""),
-    "one corner": (
-        "signal",
-        ...,
-        QUOTED,
-        "[[0.0, 0.1]]",
-    ),
-    "no corner": ("signal", ..., QUOTED, "[]"),
-    "ramps that go back in time": ("signal", ..., QUOTED, "[[0.0, 0.0], [2.0, 1.0], [1.0, 1.0]]"),
-    "very long expression": ("signal, column 10001", ..., SIN, "t + " * 50_000 + "x"),
-    "deep expression": ("signal, column 10001", ..., SIN, "(" * 5000 + "t" + ")" * 5000),
-}
-group("value of a scenario", ScenarioError, edited, rows)
-rows = {
-    "step under the clock": ("run.max_step", 1e-18, END, f"{END}\nmax_step = 1e-18"),
-    "no step for a method without error estimate": (
-        "line 17, run.method",
-        ...,
-        END,
-        f'{END}\nmethod = "rk4"',
-    ),
-    "events per step without a step": ("line 17, run.events", ..., END, f'{END}\nevents = "step"'),
-    "too few initial z": ("line 19, initial.z", ..., "[output]", "[initial]\nz = [0.0]\n[output]"),
-    "unknown initial state": (
-        "line 19, initial.states",
-        ...,
-        "[output]",
-        '[initial]\nstates = ["stick", "slide"]\n[output]',
-    ),
-    "initial velocity of a prescribed motion": (
-        "line 19, initial.v",
-        ...,
-        "[output]",
-        "[initial]\nv = 0.1\n[output]",
-    ),
-}
-group("run of a scenario", ScenarioError, edited, rows)
+group("run of a scenario", edited, rows)
 rows = {
     "table for a text": ('title = "open loop"', "title = {}"),
     "no number in a list": ("[100.0, 50.0]", "[]"),
@@ -368,54 +306,36 @@ rows = {
     "empty run": (f"{END}\n", ""),
     "rig by its class": ('kind = "prescribed"', 'kind = "PulledSlider"'),
     "one C for two elements": (ONE_C, "C = [0.1]"),
+    "tolerance of what is not there": (END, f"{END}\natol.y = 1"),
+    "invariant of an unknown name": (END, f'{END}\nmonitors = ["passivity", "zz < 1"]'),
 }
-group("key of a scenario", ScenarioError, edited, rows, "a.toml")
+group("key of a scenario", edited, rows)
 rows = {
-    "tolerance of what is not there": ("line 17, run.atol.y: atol", ..., END, f"{END}\natol.y = 1"),
-    "invariant of an unknown name": (
-        "line 17, run.monitors.1: invariant, column 1",
-        ...,
-        END,
-        f'{END}\nmonitors = ["passivity", "zz < 1"]',
-    ),
+    "end before the start": (END, "t_end = -1.0"),
+    "end at the start": (END, "t_end = 0"),
+    "end too far": (f"{END}\n\n[output]\n", "t_end = 1e300\n[output]\nevery = 0.1\n"),
+    "rows that are counted": (f"{END}\n\n[output]\n", f"{END}\n[output]\nevery = 1000\n"),
+    "stiffness below zero": (RIG, PULLED),
 }
-group("key of a scenario", ScenarioError, edited, rows)
+group("run of a scenario", edited, rows)
 rows = {
-    "end before the start": ("a.toml: line 16: run.t_end", -1.0, END, "t_end = -1.0"),
-    "end at the start": ("a.toml: line 16: run.t_end", 0.0, END, "t_end = 0"),
-    "end too far": (
-        "a.toml: line 16: run.t_end",
-        1e300,
-        f"{END}\n\n[output]\n",
-        "t_end = 1e300\n[output]\nevery = 0.1\n",
-    ),
-    "rows that are counted": (
-        "a.toml: line 18: output.every",
-        1000.0,
-        f"{END}\n\n[output]\n",
-        f"{END}\n[output]\nevery = 1000\n",
-    ),
-    "stiffness below zero": ("rig.stiffness", -5.0, RIG, PULLED),
+    "empty": b"",
+    "only a comment": "# later\n",
+    "half a table head": OPEN_LOOP.replace("[run]", "[run"),
+    "a key twice": OPEN_LOOP + "figures = []\n",
+    "binary": bytes(range(256)) * 10,
+    "UTF-16": OPEN_LOOP.encode("utf-16"),
+    "Latin-1": OPEN_LOOP.replace("[rig]", "# Gerät\n[rig]").encode("latin-1"),
+    "brackets without end": "a = " + "[" * 5000,
+    "a line of 2 MB": "title = '" + "a" * 2_000_000 + "'\n",
+    "no number at all": "title = 1.2.3",
+    "a text that ends before a point": "title = '.5' x",
+    "a bare key without end": "\n" + "a." * 300_000 + "a = 1\n",
+    "a quoted key without end": "\n" + '"a".' * 200_000 + "a = 1\n",
+    "a head without end": "\n[" + "a." * 300_000 + "a]\n",
+    "an inline key without end": "\nk = { " + "a." * 300_000 + "a = 1 }\n",
 }
-group("run of a scenario", ScenarioError, edited, rows)
-rows = {
-    "empty": (b"",),
-    "only a comment": ("# later\n",),
-    "half a table head": (OPEN_LOOP.replace("[run]", "[run"),),
-    "a key twice": (OPEN_LOOP + "figures = []\n",),
-    "binary": (bytes(range(256)) * 10,),
-    "UTF-16": (OPEN_LOOP.encode("utf-16"),),
-    "Latin-1": (OPEN_LOOP.replace("[rig]", "# Gerät\n[rig]").encode("latin-1"),),
-    "brackets without end": ("a = " + "[" * 5000,),
-    "a line of 2 MB": ("title = '" + "a" * 2_000_000 + "'\n",),
-    "no number at all": ("title = 1.2.3",),
-    "a text that ends before a point": ("title = '.5' x",),
-    "a bare key without end": ("\n" + "a." * 300_000 + "a = 1\n",),
-    "a quoted key without end": ("\n" + '"a".' * 200_000 + "a = 1\n",),
-    "a head without end": ("\n[" + "a." * 300_000 + "a]\n",),
-    "an inline key without end": ("\nk = { " + "a." * 300_000 + "a = 1 }\n",),
-}
-group("file that is no scenario", ScenarioError, scenario, rows, "a.toml")
+group("file that is no scenario", scenario, rows)
 rows = {
     "unit": (END, "t_end = 60 s"),
     "unit that is a quotient": ("v_c = 1e-6", "v_c = 1e-3 mm/s"),
@@ -443,7 +363,7 @@ rows = {
     "table twice": ("[run]", "[rig]\n[run]"),
     "braces without a comma": ("F_c = 1.0, F_s", "F_c = 1.0 F_s"),
 }
-group("line that is no TOML", ScenarioError, edited, rows, "a.toml")
+group("line that is no TOML", edited, rows)
 rows = {
     "of another table": (OPEN_LOOP, "law=signed"),
     "typo": (OPEN_LOOP, "tend=3"),
@@ -451,21 +371,11 @@ rows = {
     "typo in the right table": (OPEN_LOOP, "run.tend=3"),
     "of a table that is absent": (OPEN_LOOP, "smoothing=3"),
     "very long key": (OPEN_LOOP, f"model.{LONG}.a=1"),
-}
-group("override", ScenarioError, scenario, rows, "a.toml")
-rows = {
-    "rows too close together": ("output.every", 5e-324, OPEN_LOOP, "output.every=5e-324"),
-}
-group("override", ScenarioError, scenario, rows)
-rows = {
-    "digit before the point": ("--set model.k=[.25, 1]", ..., OPEN_LOOP, "model.k=[.25, 1]"),
-    "digit behind the point": ("--set run.t_end=3.", ..., OPEN_LOOP, "run.t_end=3."),
-    "no assignment": ("", ..., OPEN_LOOP, LONG),
-    "deep key": ("", ..., OPEN_LOOP, "title={" + "a." * 50_000 + "a=1}"),
-}
-group("override", ScenarioError, scenario, rows)
-
-rows = {
+    "rows too close together": (OPEN_LOOP, "output.every=5e-324"),
+    "digit before the point": (OPEN_LOOP, "model.k=[.25, 1]"),
+    "digit behind the point": (OPEN_LOOP, "run.t_end=3."),
+    "no assignment": (OPEN_LOOP, LONG),
+    "deep key": (OPEN_LOOP, "title={" + "a." * 50_000 + "a=1}"),
     "unknown key": (OPEN_LOOP, "model.lwa=published"),
     "unknown table": (OPEN_LOOP, "modell.law=published"),
     "unknown law": (OPEN_LOOP, "model.law=singed"),
@@ -478,19 +388,16 @@ rows = {
     "half a table": (OPEN_LOOP, "record.file=own.csv"),
     "monitor that is a number": (OPEN_LOOP, "run.monitors=[3]"),
     "monitor without a list": (OPEN_LOOP, "run.monitors=coverage"),
+    "monitor that is none": (OPEN_LOOP, "run.monitors=['pasivity']"),
+    "no key": (OPEN_LOOP, "=3"),
+    "no table": (OPEN_LOOP, ".t_end=3"),
+    "two points": (OPEN_LOOP, "run..t_end=3"),
+    "key of a number": (OPEN_LOOP, "run.t_end.x=3"),
+    "two lines": (OPEN_LOOP, "run.t_end=2\nrun.rtol = 1e-3"),
+    "endless list": (OPEN_LOOP, "model.k=" + "[" * 5000),
+    "key with very many points": (OPEN_LOOP, "a." * 5000 + "a=1"),
 }
-group("override", ScenarioError, scenario, rows, "a.toml")
-rows = {
-    "monitor that is none": ("--set, run.monitors.0", ..., OPEN_LOOP, "run.monitors=['pasivity']"),
-    "no key": ("--set =3", ..., OPEN_LOOP, "=3"),
-    "no table": ("--set .t_end=3", ..., OPEN_LOOP, ".t_end=3"),
-    "two points": ("--set run..t_end=3", ..., OPEN_LOOP, "run..t_end=3"),
-    "key of a number": ("--set run.t_end.x=3", ..., OPEN_LOOP, "run.t_end.x=3"),
-    "two lines": ("--set run.t_end=2", ..., OPEN_LOOP, "run.t_end=2\nrun.rtol = 1e-3"),
-    "endless list": ("", ..., OPEN_LOOP, "model.k=" + "[" * 5000),
-    "key with very many points": ("", ..., OPEN_LOOP, "a." * 5000 + "a=1"),
-}
-group("override", ScenarioError, scenario, rows)
+group("override", scenario, rows)
 
 
 def system_of(text: str) -> None:
@@ -500,7 +407,7 @@ def system_of(text: str) -> None:
 
 
 rows = {"model on a rig": (OPEN_LOOP,)}
-group("system of a scenario", ScenarioError, system_of, rows, "a.toml")
+group("system of a scenario", system_of, rows)
 
 
 def grid(*over: str) -> None:
@@ -510,22 +417,22 @@ def grid(*over: str) -> None:
 
 
 rows = {
-    "no numbers": ("--over F_s", ..., "F_s"),
-    "no count": ("--over F_s=1:2", ..., "F_s=1:2"),
-    "no name": ("--over =1:2:3", ..., "=1:2:3"),
-    "unknown spacing": ("--over F_s=1:2:3,lin", ..., "F_s=1:2:3,lin"),
-    "word": ("--over F_s=a:2:3", ..., "F_s=a:2:3"),
-    "decimal comma": ("--over F_s=0,5:2:4,log", ..., "F_s=0,5:2:4,log"),
-    "unit": ("--over F_s=1 mN:5 mN:5", ..., "F_s=1 mN:5 mN:5"),
-    "fraction of a run": ("--over F_s=1:2:3.5", ..., "F_s=1:2:3.5"),
-    "infinity": ("--over F_s=1:inf:3", ..., "F_s=1:inf:3"),
-    "one run": ("--over F_s=1:2:1", ..., "F_s=1:2:1"),
-    "logarithm of zero": ("--over F_s=0:2:3,log", ..., "F_s=0:2:3,log"),
-    "unknown name": ("", ..., "F_q=1:2:3"),
-    "name twice": ("", ..., "F_s=1:2:3", "F_s=1:2:3"),
-    "too many runs": ("", ..., "F_s=1:2:2000", "v_s=1:2:2000"),
+    "no numbers": "F_s",
+    "no count": "F_s=1:2",
+    "no name": "=1:2:3",
+    "unknown spacing": "F_s=1:2:3,lin",
+    "word": "F_s=a:2:3",
+    "decimal comma": "F_s=0,5:2:4,log",
+    "unit": "F_s=1 mN:5 mN:5",
+    "fraction of a run": "F_s=1:2:3.5",
+    "infinity": "F_s=1:inf:3",
+    "one run": "F_s=1:2:1",
+    "logarithm of zero": "F_s=0:2:3,log",
+    "unknown name": "F_q=1:2:3",
+    "name twice": ("F_s=1:2:3", "F_s=1:2:3"),
+    "too many runs": ("F_s=1:2:2000", "v_s=1:2:2000"),
 }
-group("grid of a sweep", ParameterError, grid, rows)
+group("grid of a sweep", grid, rows)
 
 
 def lively(*vary: str) -> None:
@@ -534,14 +441,14 @@ def lively(*vary: str) -> None:
 
 
 rows = {
-    "no number": ("--vary", "F_s=low..high", "F_s=low..high"),
-    "not a range": ("--vary", "F_s=2", "F_s=2"),
-    "beside the value": ("vary['F_s']", (2.0, 3.0), "F_s=2..3"),
-    "highest value first": ("vary['F_s']", (3.0, 0.5), "F_s=3..0.5"),
-    "no such number": ("", ..., "F_x=2..3"),
-    "printed with its value": ("vary['delta']", 2.0, "delta"),
+    "no number": "F_s=low..high",
+    "not a range": "F_s=2",
+    "beside the value": "F_s=2..3",
+    "highest value first": "F_s=3..0.5",
+    "no such number": "F_x=2..3",
+    "printed with its value": "delta",
 }
-group("slider of a live page", ParameterError, lively, rows)
+group("slider of a live page", lively, rows)
 
 
 def own(name: str, old: str, new: str, command: str) -> None:
@@ -570,177 +477,102 @@ rows = {
         f'{UNTIL}\nstep = 1e-3\nevents = "held"',
         "run pair.toml",
     ),
-}
-group("own file", ScenarioError, own, rows, "pair.toml")
-rows = {
-    "too many rows": (
-        "output.every",
-        1e-09,
-        "pair",
-        FIGURES,
-        f"{FIGURES}\nevery = 1e-9",
-        "run pair.toml",
-    ),
-    "initial value": (
-        "line 47, initial.one.y",
-        ...,
-        "pair",
-        "one.x = 1e-3",
-        "one.y = 1e-3",
-        "run pair.toml",
-    ),
-}
-group("own file", ScenarioError, own, rows)
-rows = {"one bracket": ("pulled", "[[contact]]", "[contact]", "run pulled.toml")}
-group("own file", ScenarioError, own, rows, "pulled.toml")
-rows = {
-    "guard": ("guard, column 5", ..., "own", TO_FORWARD, 'guard = "F > F_k"', "run pair.toml"),
-    "missing chart": ("one.toml", ..., "pulled", '"own.toml"', '"one.toml"', "blocks pulled.toml"),
-    "its own chart": (
-        "pulled.toml",
-        ...,
-        "pulled",
-        '"own.toml"',
-        '"pulled.toml"',
-        "run pulled.toml",
-    ),
-    "no TOML": ("own.toml", ..., "own", STICTION, "name = stiction", "chart own.toml"),
-}
-group("own file", ScenarioError, own, rows)
-rows = {
-    "guard of a chart": (
-        "column 1",
-        ...,
-        "own",
-        TO_FORWARD,
-        'guard = "F >> F_s"',
-        "check own.toml",
-    ),
+    "too many rows": ("pair", FIGURES, f"{FIGURES}\nevery = 1e-9", "run pair.toml"),
+    "initial value": ("pair", "one.x = 1e-3", "one.y = 1e-3", "run pair.toml"),
+    "one bracket": ("pulled", "[[contact]]", "[contact]", "run pulled.toml"),
+    "guard": ("own", TO_FORWARD, 'guard = "F > F_k"', "run pair.toml"),
+    "missing chart": ("pulled", '"own.toml"', '"one.toml"', "blocks pulled.toml"),
+    "its own chart": ("pulled", '"own.toml"', '"pulled.toml"', "run pulled.toml"),
+    "no TOML": ("own", STICTION, "name = stiction", "chart own.toml"),
+    "guard of a chart": ("own", TO_FORWARD, 'guard = "F >> F_s"', "check own.toml"),
     "circle of names": (
-        "column 1",
-        ...,
         "own",
         STICTION,
         f'{STICTION}\nlet = {{ a = "b", b = "a" }}',
         "chart own.toml",
     ),
 }
-group("own file", ExpressionError, own, rows)
+group("own file", own, rows)
 rows = {
-    "chart file that is missing": ("none.toml", ..., "chart none.toml"),
-    "run of a chart file": ("own.toml", ..., "run own.toml"),
-    "sweep of a chart file": ("own.toml", ..., "sweep own.toml --over F_s=1:2:2"),
-    "missing body": ("--set body.tow.inertia=1", ..., "run pair.toml --set body.tow.inertia=1"),
-    "unknown name in an override": ("column 1", ..., "run pair.toml --set body.two.inertia=q"),
-    "no inertia": ("system 'pair', body 'two'", ..., "run pair.toml --set body.two.inertia=0"),
-    "value for a contact": ("pair.toml", ..., "run pair.toml --set contact.gear=1"),
-    "scenario that is missing": ("gone.toml", ..., "run gone.toml"),
-    "scenario that is a folder": (".", ..., "run ."),
-    "name of no scenario": ("", ..., "debug pulledmass"),
-    "file without its ending": ("", ..., "run pair"),
-    "fit of a table": ("own.csv", ..., "fit own.csv"),
-    "fit of a scenario of the package": ("pulled_mass", ..., "fit pulled_mass"),
+    "chart file that is missing": "chart none.toml",
+    "run of a chart file": "run own.toml",
+    "sweep of a chart file": "sweep own.toml --over F_s=1:2:2",
+    "missing body": "run pair.toml --set body.tow.inertia=1",
+    "unknown name in an override": "run pair.toml --set body.two.inertia=q",
+    "no inertia": "run pair.toml --set body.two.inertia=0",
+    "value for a contact": "run pair.toml --set contact.gear=1",
+    "scenario that is missing": "run gone.toml",
+    "scenario that is a folder": "run .",
+    "name of no scenario": "debug pulledmass",
+    "file without its ending": "run pair",
+    "fit of a table": "fit own.csv",
+    "fit of a scenario of the package": "fit pulled_mass",
+    "chart that is missing": "chart none",
+    "chart that is a folder": "chart .",
+    "chart file with a law": "chart own.toml --law signed",
+    "contact that is missing": "check pair.toml --contact pad",
+    "law that is missing": "code --law foo",
+    "lesson by another number": "lesson 99",
+    "page of no lesson": "lesson --page",
+    "chart file with a contact": "chart own.toml --contact pad",
+    "chart with a contact": "chart lugre --contact pad",
+    "chart without a contact": "chart pair.toml",
+    "blocks of no file": "blocks own",
+    "ending of a chart": "chart lugre -o x.tex",
+    "force of the paper": "paper --force sin( -o p",
+    "output folder in a file": "run pulled.toml -o own.toml/out",
+    "output folder that is a file": "run pulled.toml -o own.toml",
+    "law of a chart with several": "chart gms",
+    "ending of a picture": "chart gms --law signed -o c.jpg",
+    "no elements": "chart gms --law signed --elements 0",
+    "elements below zero": "blocks --elements -1",
+    "schematic of no system": "blocks --schematic",
+    "ending of a schematic": "blocks pair.toml --schematic -o s.dot",
+    "elements of a system": "blocks pair.toml --elements 3",
+    "blocks of a chart file": "blocks own.toml",
+    "check of a missing chart": "check nothing",
+    "chart in other letters": "chart GMS",
+    "chart with a hyphen": "handout lu-gre",
+    "beginning of a model": "phenomena --model GMS -o o",
+    "number of the rig in a sweep": "sweep pulled.toml --over rig.m=1:2:2",
+    "law of a broken chart": "check broken:arms --law signed",
+    "domain that is empty": "check gms --law signed --domain s>0 --domain s<0",
+    "domain that is not encoded": "check gms --law signed --domain exp(s)>1",
+    "code of a chart without a rig": "code own.toml",
+    "rig of a system": "code pair.toml --rig slider",
+    "sweep over a missing contact": "sweep pair.toml --over pad3.F_s=1:2:2",
+    "unknown model of the bench": "phenomena --model lugree -o o",
+    "unknown phenomenon": "phenomena --phenomenon lagg -o o",
+    "number without a value": "phenomena --set F_s -o o",
+    "unknown number of the bench": "phenomena --set F_x=1 -o o",
+    "chart without values": "phenomena own.toml -o o",
+    "system of several contacts": "phenomena pair.toml -o o",
+    "model that is no file": "phenomena lugre -o o",
+    "data set that is missing": "benchmark --only skates -o out",
+    "export without a format": "export own.toml",
+    "handout of a chart file": "handout own.toml",
+    "debug of a missing scenario": "debug none.toml",
+    "run of a trace": "run t.npz",
+    "number that there is not": "run pair.toml --set numbers.k=3",
+    "debug of a program": "debug mine.py",
+    "debug of a trace": "debug t.CSV",
+    "override without a value": "run pair.toml --set run.t_end",
+    "fit of a missing scenario": "fit none.toml",
+    "debug of a run that cannot be": "debug pulled.toml --set run.t_end=-1",
+    "domain of an unknown name": "check gms --law signed --domain s>q",
+    "velocity of the paper": "paper --velocity __import__('os') -o p",
+    "plot of a missing trace": "plot none.npz",
+    "plot of no trace": "plot own.toml",
+    "replay of a scenario": "replay pulled.toml",
+    "replay of a scenario of the package": "replay servo",
+    "diff of a chart and a trace": "diff own.toml none.npz",
+    "diff of a chart with laws": "diff gms lugre",
+    "diff of an unknown law": "diff gms:sigend lugre",
+    "diff of a contact of a chart": "diff lugre dahl --contact pad",
+    "diff with a missing trace": "diff none.npz none.npz",
+    "data that are missing": "benchmark --data nowhere -o out",
 }
-group("command", ScenarioError, command, rows)
-rows = {
-    "chart that is missing": ("chart none",),
-    "chart that is a folder": ("chart .",),
-    "chart file with a law": ("chart own.toml --law signed",),
-    "contact that is missing": ("check pair.toml --contact pad",),
-    "law that is missing": ("code --law foo",),
-    "lesson by another number": ("lesson 99",),
-}
-group("command", ParameterError, command, rows, "")
-rows = {
-    "page of no lesson": ("--page", ..., "lesson --page"),
-    "chart file with a contact": ("--contact pad: own.toml", ..., "chart own.toml --contact pad"),
-    "chart with a contact": ("--contact pad", ..., "chart lugre --contact pad"),
-    "chart without a contact": ("pair.toml", ..., "chart pair.toml"),
-    "blocks of no file": ("own", ..., "blocks own"),
-    "ending of a chart": ("path", "x.tex", "chart lugre -o x.tex"),
-}
-group("command", ParameterError, command, rows)
-rows = {
-    "force of the paper": ("signal, column 4", ..., "paper --force sin( -o p"),
-}
-group("command", ExpressionError, command, rows)
-rows = {
-    "output folder in a file": ("", ..., "run pulled.toml -o own.toml/out"),
-    "output folder that is a file": ("", ..., "run pulled.toml -o own.toml"),
-}
-group("command", OutputError, command, rows)
-
-
-rows = {
-    "law of a chart with several": ("", ..., "chart gms"),
-    "ending of a picture": ("path", "c.jpg", "chart gms --law signed -o c.jpg"),
-    "no elements": ("elements", 0, "chart gms --law signed --elements 0"),
-    "elements below zero": ("elements", -1, "blocks --elements -1"),
-    "schematic of no system": ("--schematic", ..., "blocks --schematic"),
-    "ending of a schematic": ("path", "s.dot", "blocks pair.toml --schematic -o s.dot"),
-    "elements of a system": ("--elements", ..., "blocks pair.toml --elements 3"),
-    "blocks of a chart file": ("own.toml", ..., "blocks own.toml"),
-    "check of a missing chart": ("", ..., "check nothing"),
-    "chart in other letters": ("", ..., "chart GMS"),
-    "chart with a hyphen": ("", ..., "handout lu-gre"),
-    "beginning of a model": ("", ..., "phenomena --model GMS -o o"),
-    "number of the rig in a sweep": ("--over", ..., "sweep pulled.toml --over rig.m=1:2:2"),
-    "law of a broken chart": ("", ..., "check broken:arms --law signed"),
-    "domain that is empty": ("", ..., "check gms --law signed --domain s>0 --domain s<0"),
-    "domain that is not encoded": ("", ..., "check gms --law signed --domain exp(s)>1"),
-    "code of a chart without a rig": ("contact 'friction'", ..., "code own.toml"),
-    "rig of a system": ("--rig", ..., "code pair.toml --rig slider"),
-    "sweep over a missing contact": ("", ..., "sweep pair.toml --over pad3.F_s=1:2:2"),
-    "unknown model of the bench": ("", ..., "phenomena --model lugree -o o"),
-    "unknown phenomenon": ("", ..., "phenomena --phenomenon lagg -o o"),
-    "number without a value": ("", ..., "phenomena --set F_s -o o"),
-    "unknown number of the bench": ("", ..., "phenomena --set F_x=1 -o o"),
-    "chart without values": ("own.toml", ..., "phenomena own.toml -o o"),
-    "system of several contacts": ("pair.toml", ..., "phenomena pair.toml -o o"),
-    "model that is no file": ("", ..., "phenomena lugre -o o"),
-    "data set that is missing": ("dataset", ..., "benchmark --only skates -o out"),
-    "export without a format": ("--to", ..., "export own.toml"),
-    "handout of a chart file": ("own.toml", ..., "handout own.toml"),
-}
-group("command", ParameterError, command, rows)
-rows = {
-    "debug of a missing scenario": ("none.toml", ..., "debug none.toml"),
-    "run of a trace": ("t.npz", ..., "run t.npz"),
-    "number that there is not": ("", ..., "run pair.toml --set numbers.k=3"),
-    "debug of a program": ("mine.py", ..., "debug mine.py"),
-    "debug of a trace": ("t.CSV", ..., "debug t.CSV"),
-    "override without a value": ("--set run.t_end", ..., "run pair.toml --set run.t_end"),
-    "fit of a missing scenario": ("none.toml", ..., "fit none.toml"),
-    "debug of a run that cannot be": (
-        "pulled.toml: --set: run.t_end",
-        -1.0,
-        "debug pulled.toml --set run.t_end=-1",
-    ),
-}
-group("command", ScenarioError, command, rows)
-rows = {
-    "domain of an unknown name": ("domain, column 3", ..., "check gms --law signed --domain s>q"),
-    "velocity of the paper": ("column 1", ..., "paper --velocity __import__('os') -o p"),
-}
-group("command", ExpressionError, command, rows)
-rows = {
-    "plot of a missing trace": ("none.npz", ..., "plot none.npz"),
-    "plot of no trace": ("own.toml", ..., "plot own.toml"),
-    "replay of a scenario": ("pulled.toml", ..., "replay pulled.toml"),
-    "replay of a scenario of the package": ("servo", ..., "replay servo"),
-}
-group("command", TraceFileError, command, rows)
-rows = {
-    "diff of a chart and a trace": ("diff", ..., "diff own.toml none.npz"),
-    "diff of a chart with laws": ("diff", ..., "diff gms lugre"),
-    "diff of an unknown law": ("diff", ..., "diff gms:sigend lugre"),
-    "diff of a contact of a chart": ("--contact pad", ..., "diff lugre dahl --contact pad"),
-}
-group("command", ParameterError, command, rows)
-rows = {"diff with a missing trace": ("none.npz", ..., "diff none.npz none.npz")}
-group("command", TraceFileError, command, rows)
-rows = {"data that are missing": ("nowhere", ..., "benchmark --data nowhere -o out")}
-group("command", RecordError, command, rows)
+group("command", command, rows)
 
 
 # --------------------------------------------------------------------------- records
@@ -761,43 +593,43 @@ def row(number: int, text: str) -> str:
 
 
 rows = {
-    "text in a number column": (row(5, "0.03,abc,1"),),
-    "empty cell": (row(5, "0.03,,1"),),
-    "hexadecimal number": (row(5, "0x3,1,1"),),
-    "very long cell": (row(5, f"0.03,{LONG},1"),),
-    "NaN in the position": (row(5, "0.03,nan,1"),),
-    "infinity": (row(60, "0.58,-inf,1"),),
-    "number too big": (row(5, "0.03,1e400,1"),),
-    "many NaN": ("\n".join([LINES[0], *(f"{i},nan,1" for i in range(20))]),),
-    "row that is too short": (row(5, "0.03,1"),),
-    "row that is too long": (row(5, "0.03,1,2,3"),),
-    "empty row": (row(5, ""),),
-    "empty row between two tables": (GOOD + "\n\n1,1,1\n",),
-    "decimal commas": (GOOD.replace(",", ";").replace(".", ","),),
-    "decimal commas between commas": (GOOD.replace(".", ","),),
-    "remark below": (GOOD + "the end\n",),
-    "quote that never closes": (row(5, '"0.03,1,1'),),
-    "quote that never closes, and a long file": (row(5, '"0.03,1,1') + "0,0,0\n" * 50_000,),
-    "time that goes backward": (row(10, "0.01,1,1"),),
-    "time that falls all along": (table(["t", "x", "F"], -EVEN, EVEN, EVEN),),
-    "missing column": ("t,pos,F\n0,0,0\n1,1,1\n",),
-    "very long head": (GOOD.replace("F", LONG, 1),),
-    "columns divided by /": (GOOD.replace(",", "/"),),
-    "column twice": ("t,x,F,x\n0,0,0,0\n1,1,1,1\n",),
-    "no head line": (GOOD.partition("\n")[2],),
-    "units that contradict the scenario": (row(2, "[ms],[mm],[N]"),),
-    "words in the second line": (row(2, "a,b,c"),),
-    "empty file": ("",),
-    "head line only": ("t,x,F\n",),
-    "four rows": ("t,x,F\n0,0,0\n1,1,1\n2,2,2\n3,3,3\n",),
-    "line of 2 MB": ("t,x,F\n0,0," + "1" * 2_000_000 + "\n",),
-    "binary": (bytes(range(256)) * 50,),
-    "zero byte in a row": (row(5, "0.03,\0,1"),),
-    "UTF-16 without a mark": (GOOD.encode("utf-16-le"),),
-    "UTF-16 cut short": (GOOD.encode("utf-16")[:-1],),
-    "Latin-1": (GOOD.replace("F", "µ", 1).encode("latin-1"),),
+    "text in a number column": row(5, "0.03,abc,1"),
+    "empty cell": row(5, "0.03,,1"),
+    "hexadecimal number": row(5, "0x3,1,1"),
+    "very long cell": row(5, f"0.03,{LONG},1"),
+    "NaN in the position": row(5, "0.03,nan,1"),
+    "infinity": row(60, "0.58,-inf,1"),
+    "number too big": row(5, "0.03,1e400,1"),
+    "many NaN": "\n".join([LINES[0], *(f"{i},nan,1" for i in range(20))]),
+    "row that is too short": row(5, "0.03,1"),
+    "row that is too long": row(5, "0.03,1,2,3"),
+    "empty row": row(5, ""),
+    "empty row between two tables": GOOD + "\n\n1,1,1\n",
+    "decimal commas": GOOD.replace(",", ";").replace(".", ","),
+    "decimal commas between commas": GOOD.replace(".", ","),
+    "remark below": GOOD + "the end\n",
+    "quote that never closes": row(5, '"0.03,1,1'),
+    "quote that never closes, and a long file": row(5, '"0.03,1,1') + "0,0,0\n" * 50_000,
+    "time that goes backward": row(10, "0.01,1,1"),
+    "time that falls all along": table(["t", "x", "F"], -EVEN, EVEN, EVEN),
+    "missing column": "t,pos,F\n0,0,0\n1,1,1\n",
+    "very long head": GOOD.replace("F", LONG, 1),
+    "columns divided by /": GOOD.replace(",", "/"),
+    "column twice": "t,x,F,x\n0,0,0,0\n1,1,1,1\n",
+    "no head line": GOOD.partition("\n")[2],
+    "units that contradict the scenario": row(2, "[ms],[mm],[N]"),
+    "words in the second line": row(2, "a,b,c"),
+    "empty file": "",
+    "head line only": "t,x,F\n",
+    "four rows": "t,x,F\n0,0,0\n1,1,1\n2,2,2\n3,3,3\n",
+    "line of 2 MB": "t,x,F\n0,0," + "1" * 2_000_000 + "\n",
+    "binary": bytes(range(256)) * 50,
+    "zero byte in a row": row(5, "0.03,\0,1"),
+    "UTF-16 without a mark": GOOD.encode("utf-16-le"),
+    "UTF-16 cut short": GOOD.encode("utf-16")[:-1],
+    "Latin-1": GOOD.replace("F", "µ", 1).encode("latin-1"),
 }
-group("table", RecordError, measured, rows, "own.csv")
+group("table", measured, rows)
 
 
 def setting(old: str, new: str) -> None:
@@ -811,12 +643,9 @@ def setting(old: str, new: str) -> None:
 
 FILE = 'file = "own.csv"'
 rows = {
-    "unknown unit": ("line 18, record.position", ..., '"mm"', '"furlong"'),
-    "unit of something else": ("line 18, record.position", ..., '"mm"', '"ms"'),
-    "very long unit": ("line 19, record.force", ..., 'unit = "N"', f'unit = "{LONG}"'),
-}
-group("setting of a record", ScenarioError, setting, rows)
-rows = {
+    "unknown unit": ('"mm"', '"furlong"'),
+    "unit of something else": ('"mm"', '"ms"'),
+    "very long unit": ('unit = "N"', f'unit = "{LONG}"'),
     "no unit": (', unit = "mm"', ""),
     "typo": ('"N" }', '"N", sgin = -1 }'),
     "sign of 2": ('"N" }', '"N", sign = 2 }'),
@@ -825,25 +654,11 @@ rows = {
     "negative smoothing": (FILE, f"{FILE}\nsmoothing = -1.0"),
     "two delimiters": (FILE, f'{FILE}\ndelimiter = ";;"'),
     "line end as delimiter": (FILE, f'{FILE}\ndelimiter = "\\n"'),
-}
-group("setting of a record", ScenarioError, setting, rows, "a.toml")
-rows = {
-    "another folder": ("record.file", "../own.csv", '"own.csv"', '"../own.csv"'),
-    "absolute path": ("record.file", "/etc/passwd", '"own.csv"', '"/etc/passwd"'),
-    "no such file": ("record.file", "gone.csv", '"own.csv"', '"gone.csv"'),
-    "start before the record": (
-        "line 22, run.t_start",
-        ...,
-        "[output]",
-        "[run]\nt_start = -1.0\n[output]",
-    ),
-}
-group("setting of a record", ScenarioError, setting, rows)
-rows = {
-    "start after the record": ("run.t_start", 0.7, "[output]", "[run]\nt_start = 0.7\n[output]")
-}
-group("setting of a record", ScenarioError, setting, rows)
-rows = {
+    "another folder": ('"own.csv"', '"../own.csv"'),
+    "absolute path": ('"own.csv"', '"/etc/passwd"'),
+    "no such file": ('"own.csv"', '"gone.csv"'),
+    "start before the record": ("[output]", "[run]\nt_start = -1.0\n[output]"),
+    "start after the record": ("[output]", "[run]\nt_start = 0.7\n[output]"),
     "no motion": ('position = { column = "x", unit = "mm" }\n', ""),
     "smoothing beyond all bounds": (FILE, f"{FILE}\nsmoothing = 1e100"),
     "selection by an unknown name": (FILE, f'{FILE}\nwhere = "F > 1 N"'),
@@ -860,23 +675,10 @@ rows = {
     "selection by a column that is not given": (FILE, f'{FILE}\nwhere = "normal > 4.5 N"'),
     "selection that divides by zero": (FILE, f'{FILE}\nwhere = "1 / (time - 0.1) > 0"'),
     "selection that cannot be computed": (FILE, f'{FILE}\nwhere = "sqrt(force) > 1 N"'),
+    "selection by a unit": (FILE, f'{FILE}\nwhere = "force > 1 lb"'),
+    "selection by another unit": (FILE, f'{FILE}\nwhere = "force > -5 mm"'),
 }
-group("setting of a record", RecordError, setting, rows, "own.csv")
-rows = {
-    "selection by a unit": (
-        "record.where = 'force > 1 lb'",
-        ...,
-        FILE,
-        f'{FILE}\nwhere = "force > 1 lb"',
-    ),
-    "selection by another unit": (
-        "record.where = 'force > -5 mm'",
-        ...,
-        FILE,
-        f'{FILE}\nwhere = "force > -5 mm"',
-    ),
-}
-group("setting of a record", RecordError, setting, rows)
+group("setting of a record", setting, rows)
 
 
 INSTRUMENT = "t_s;x_mm;F_N\n" + "".join(f"{i / 4};{i};{i / 2}\n" for i in range(20))
@@ -894,27 +696,27 @@ def from_csv(content: str | bytes = INSTRUMENT, **options: Any) -> dict[str, Any
 
 
 rows = {
-    "another column": (from_csv(force=("Kraft", "N")),),
-    "decimal commas without the option": (from_csv(COMMAS),),
-    "option without decimal commas": (from_csv(decimal=","),),
-    "both marks": (from_csv(COMMAS.replace("0,0;", "1.234,5;", 1), decimal=","),),
-    "another encoding": (from_csv(INSTRUMENT.replace("F_N", "F_µN").encode("latin-1")),),
-    "another encoding far down": (from_csv((INSTRUMENT + "9;9;é").encode("latin-1")),),
-    "wrong encoding": (from_csv(INSTRUMENT[:-1], encoding="utf-16"),),
-    "not of the encoding": (from_csv(b"\x81" + INSTRUMENT.encode(), encoding="cp1252"),),
-    "NaN": (from_csv(INSTRUMENT.replace(";4;2.0", ";4;nan")),),
-    "underscore in a number": (from_csv(INSTRUMENT.replace(";4;2.0", ";4;2_0")),),
-    "no row where it is asked, and words": (
-        from_csv(INSTRUMENT.replace(";4;2.0", ";4;off"), where="time > 1e3 s"),
+    "another column": from_csv(force=("Kraft", "N")),
+    "decimal commas without the option": from_csv(COMMAS),
+    "option without decimal commas": from_csv(decimal=","),
+    "both marks": from_csv(COMMAS.replace("0,0;", "1.234,5;", 1), decimal=","),
+    "another encoding": from_csv(INSTRUMENT.replace("F_N", "F_µN").encode("latin-1")),
+    "another encoding far down": from_csv((INSTRUMENT + "9;9;é").encode("latin-1")),
+    "wrong encoding": from_csv(INSTRUMENT[:-1], encoding="utf-16"),
+    "not of the encoding": from_csv(b"\x81" + INSTRUMENT.encode(), encoding="cp1252"),
+    "NaN": from_csv(INSTRUMENT.replace(";4;2.0", ";4;nan")),
+    "underscore in a number": from_csv(INSTRUMENT.replace(";4;2.0", ";4;2_0")),
+    "no row where it is asked, and words": from_csv(
+        INSTRUMENT.replace(";4;2.0", ";4;off"), where="time > 1e3 s"
     ),
-    "letter of a quantity": (from_csv(where="t > 4 s"),),
-    "name without its unit": (from_csv(INSTRUMENT.replace("F_N", "F [N]")),),
-    "no names": (from_csv(INSTRUMENT.partition("\n")[2]),),
-    "no names, and decimal commas": (from_csv(COMMAS.partition("\n")[2], decimal=","),),
-    "spreadsheet": (from_csv(b"PK\x03\x04" + bytes(range(256))),),
-    "unit beside a number": (from_csv(INSTRUMENT.replace("0.0;0;0.0", "s;0;0.0", 1)),),
+    "letter of a quantity": from_csv(where="t > 4 s"),
+    "name without its unit": from_csv(INSTRUMENT.replace("F_N", "F [N]")),
+    "no names": from_csv(INSTRUMENT.partition("\n")[2]),
+    "no names, and decimal commas": from_csv(COMMAS.partition("\n")[2], decimal=","),
+    "spreadsheet": from_csv(b"PK\x03\x04" + bytes(range(256))),
+    "unit beside a number": from_csv(INSTRUMENT.replace("0.0;0;0.0", "s;0;0.0", 1)),
 }
-group("Record.from_csv", RecordError, lambda given: read(**given), rows, "own.csv")
+group("Record.from_csv", lambda given: read(**given), rows)
 
 
 def with_at_most(rows: int) -> None:
@@ -923,16 +725,12 @@ def with_at_most(rows: int) -> None:
         read(INSTRUMENT)
 
 
-group("long table", RecordError, with_at_most, {"ten rows": (10,)}, "own.csv")
+group("long table", with_at_most, {"ten rows": 10})
 rows = {
-    "encoding that is none": ("encoding", "klingon", from_csv(encoding="klingon")),
-    "encoding of bytes": ("encoding", "base64", from_csv(encoding="base64")),
+    "encoding that is none": from_csv(encoding="klingon"),
+    "encoding of bytes": from_csv(encoding="base64"),
     **{
-        f"{quantity} is {given!r}": (
-            quantity,
-            given,
-            from_csv(**{quantity: given}),
-        )
+        f"{quantity} is {given!r}": from_csv(**{quantity: given})
         for quantity, given in {
             "time": 5,
             "position": (),
@@ -942,11 +740,7 @@ rows = {
         }.items()
     },
     **{
-        f"{option} is {given!r}": (
-            option,
-            given,
-            from_csv(**{option: given}),
-        )
+        f"{option} is {given!r}": from_csv(**{option: given})
         for option, wrong in {
             "where": (None, 0),
             "missing": ("", None, True),
@@ -961,31 +755,21 @@ rows = {
         }.items()
         for given in wrong
     },
+    "unit in the name alone": from_csv(position="x_mm"),
+    "unit of something else": from_csv(force=("F_N", "mm")),
+    "unit against the name": from_csv(time=("t [ms]", "s")),
 }
-group("Record.from_csv", ParameterError, lambda given: read(**given), rows)
-rows = {"unit in the name alone": ("position", "x_mm", from_csv(position="x_mm"))}
-group("Record.from_csv", ParameterError, lambda given: read(**given), rows)
+group("Record.from_csv", lambda given: read(**given), rows)
 rows = {
-    "unit of something else": ("", ..., from_csv(force=("F_N", "mm"))),
+    "none": None,
+    "number": 5,
+    "empty": "",
+    "missing": "gone.csv",
+    "zero byte": "a\0b",
+    "very long": "x" * 300,
+    "folder": ".",
 }
-group("Record.from_csv", UnitError, lambda given: read(**given), rows)
-rows = {
-    "unit against the name": ("column of time", "t [ms]", from_csv(time=("t [ms]", "s"))),
-}
-group("Record.from_csv", UnitError, lambda given: read(**given), rows)
-rows = {
-    "none": ("path", None, None),
-    "number": ("path", 5, 5),
-    "empty": ("path", "", ""),
-}
-group("path of a record", ParameterError, Record.from_csv, rows)
-rows = {
-    "missing": ("gone.csv", ..., "gone.csv"),
-    "zero byte": ("'a\\x00b'", ..., "a\0b"),
-    "very long": ("", ..., "x" * 300),
-    "folder": (".", ..., "."),
-}
-group("path of a record", RecordError, Record.from_csv, rows)
+group("path of a record", Record.from_csv, rows)
 
 
 def moving(scale: float) -> None:
@@ -993,10 +777,8 @@ def moving(scale: float) -> None:
     Record.from_arrays(time=EVEN, position=scale * np.sin(EVEN)).motion()
 
 
-rows = {
-    "too large": ("record 'arrays'", ..., 1.7e308),
-}
-group("motion", RecordError, moving, rows)
+rows = {"too large": 1.7e308}
+group("motion", moving, rows)
 
 
 def fit_command(override: str, head: str = "") -> None:
@@ -1008,31 +790,28 @@ def fit_command(override: str, head: str = "") -> None:
 
 
 rows = {
-    "wrong name": ("fit.free", ..., "fit.free=['kk']"),
-    "near key": ("a.toml", ..., "fit.fre=['k']"),
-    "nothing free": ("a.toml", ..., "fit.free=[]"),
-    "times reversed": ("a.toml", ..., "fit.train=[2.0, 1.0]"),
-    "bounds reversed": ("bounds of 'k1'", ..., "fit.bounds.k=[2.0, 1.0]"),
-    "three bounds": ("a.toml", ..., "fit.bounds.k=[1.0, 2.0, 3.0]"),
-    "bounds and not free": ("bounds", ..., "fit.bounds.C=[1.0, 2.0]"),
-    "search": ("a.toml", ..., "fit.search=genetic"),
-    "rows in a text": ("a.toml", ..., "fit.train=4-16"),
-    "rows with dots": ("a.toml", ..., "fit.train=4..16"),
-    "one time": ("a.toml", ..., "fit.train=4"),
-    "one time in a list": ("a.toml", ..., "fit.test=[4.0]"),
-    "one bound": ("a.toml", ..., "fit.bounds.k=1e3"),
-    "no head of the fit": ("a.toml", ..., "run.rtol=1e-5", "[fit]\n"),
-    "no head of the record": ("a.toml", ..., "run.rtol=1e-5", "[record]\n"),
-    "names in a text": ("a.toml", ..., "fit.free=k, C"),
-    "text for a column": ("a.toml", ..., "record.time=t"),
-    "measured": ("fit.measured", ..., "fit.measured=G"),
+    "wrong name": "fit.free=['kk']",
+    "near key": "fit.fre=['k']",
+    "nothing free": "fit.free=[]",
+    "times reversed": "fit.train=[2.0, 1.0]",
+    "bounds reversed": "fit.bounds.k=[2.0, 1.0]",
+    "three bounds": "fit.bounds.k=[1.0, 2.0, 3.0]",
+    "bounds and not free": "fit.bounds.C=[1.0, 2.0]",
+    "search": "fit.search=genetic",
+    "rows in a text": "fit.train=4-16",
+    "rows with dots": "fit.train=4..16",
+    "one time": "fit.train=4",
+    "one time in a list": "fit.test=[4.0]",
+    "one bound": "fit.bounds.k=1e3",
+    "no head of the fit": ("run.rtol=1e-5", "[fit]\n"),
+    "no head of the record": ("run.rtol=1e-5", "[record]\n"),
+    "names in a text": "fit.free=k, C",
+    "text for a column": "record.time=t",
+    "measured": "fit.measured=G",
+    "no rows": "fit.train=[50.0, 60.0]",
+    "column": "record.force.column=f",
 }
-group("table of a fit", ScenarioError, fit_command, rows)
-rows = {
-    "no rows": ("own.csv", ..., "fit.train=[50.0, 60.0]"),
-    "column": ("own.csv", ..., "record.force.column=f"),
-}
-group("table of a fit", RecordError, fit_command, rows)
+group("table of a fit", fit_command, rows)
 
 
 # --------------------------------------------------------------------------- fits
@@ -1058,33 +837,30 @@ def arrays(**given: Any) -> Record:
 
 
 rows = {
-    "no motion": ({"position": None},),
-    "shorter array": ({"force": F[:-1]},),
-    "two dimensions": ({"position": np.ones((40, 2))},),
-    "one number": ({"force": 1.0},),
-    "no time": ({"time": None},),
-    "words": ({"force": ["a"] * 201},),
-    "dates": ({"time": np.arange(201).astype("M8[s]")},),
-    "complex numbers": ({"force": F + 0j},),
-    "lists of different lengths": ({"force": [[1], [1, 2]]},),
-    "NaN": ({"force": np.where(T == 2.0, NAN, F)},),
-    "infinity": ({"position": np.where(T == 2.0, INF, X)},),
-    "time back": ({"time": T[::-1]},),
-    "time twice": ({"time": np.where(T == 2.0, T[101], T)},),
-    "four rows": ({"time": T[:4], "position": X[:4], "force": F[:4]},),
-    "no rows": ({"time": [], "position": [], "force": []},),
+    "no motion": {"position": None},
+    "shorter array": {"force": F[:-1]},
+    "two dimensions": {"position": np.ones((40, 2))},
+    "one number": {"force": 1.0},
+    "no time": {"time": None},
+    "words": {"force": ["a"] * 201},
+    "dates": {"time": np.arange(201).astype("M8[s]")},
+    "complex numbers": {"force": F + 0j},
+    "lists of different lengths": {"force": [[1], [1, 2]]},
+    "NaN": {"force": np.where(T == 2.0, NAN, F)},
+    "infinity": {"position": np.where(T == 2.0, INF, X)},
+    "time back": {"time": T[::-1]},
+    "time twice": {"time": np.where(T == 2.0, T[101], T)},
+    "four rows": {"time": T[:4], "position": X[:4], "force": F[:4]},
+    "no rows": {"time": [], "position": [], "force": []},
+    "wrong option": {"missing": "fill"},
+    "name that is no text": {"name": 5},
+    "inputs that are no mapping": {"inputs": T},
+    "input of a quantity": {"inputs": {"force": T}},
+    "input of the model": {"inputs": {"v": T}},
+    "sort": {"sort": "time"},
+    "duplicates": {"duplicates": "first"},
 }
-group("Record.from_arrays", RecordError, lambda given: arrays(**given), rows, "record 'rig'")
-rows = {
-    "wrong option": ("missing", "fill", {"missing": "fill"}),
-    "name that is no text": ("name", 5, {"name": 5}),
-    "inputs that are no mapping": ("inputs", T, {"inputs": T}),
-    "input of a quantity": ("name in inputs", "force", {"inputs": {"force": T}}),
-    "input of the model": ("name in inputs", "v", {"inputs": {"v": T}}),
-    "sort": ("sort", "time", {"sort": "time"}),
-    "duplicates": ("duplicates", "first", {"duplicates": "first"}),
-}
-group("Record.from_arrays", ParameterError, lambda given: arrays(**given), rows)
+group("Record.from_arrays", lambda given: arrays(**given), rows)
 rows = {
     "empty": (3.0, 3.0),
     "reversed": (3.0, 2.0),
@@ -1092,9 +868,9 @@ rows = {
     "too short": (None, 0.05),
 }
 part = arrays().between
-group("part of a record", RecordError, part, rows, "record 'rig'")
-rows = {"not a number": ("t0", NAN, NAN, None), "word": ("t0", "a", "a", None)}
-group("part of a record", ParameterError, part, rows)
+group("part of a record", part, rows)
+rows = {"not a number": (NAN, None), "word": ("a", None)}
+group("part of a record", part, rows)
 
 
 DRIVEN = System(
@@ -1112,48 +888,46 @@ def fitting(given: dict[str, Any]) -> None:
 
 
 rows = {
-    "typo": ({"free": ["kk"]},),
-    "twice": ({"free": ["k", "k2"]},),
-    "nothing": ({"free": []},),
-    "parameter without influence": ({"records": arrays(position=X / 200), "free": ["v_s"]},),
+    "typo": {"free": ["kk"]},
+    "twice": {"free": ["k", "k2"]},
+    "nothing": {"free": []},
+    "parameter without influence": {"records": arrays(position=X / 200), "free": ["v_s"]},
+    "tied and not free": {"tied": ["C"]},
+    "fixed and free": {"fixed": {"k": 2.0}},
+    "unknown fixed": {"fixed": {"q": 2.0}},
+    "fixed against the rule": {"fixed": {"v_c": -1.0}},
+    "bounds and not free": {"bounds": {"C": (0, 1)}},
+    "bounds reversed": {"bounds": {"k": (2, 1)}},
+    "bound": {"bounds": {"k": 3}},
+    "bounds against the rule": {"bounds": {"k": (-2, -1)}},
+    "nuisance": {"nuisance": ["bias"]},
+    "search": {"search": "anneal"},
+    "weight": {"weight": "all"},
+    "begin": {"begin": "warm"},
+    "measured": {"measured": "x"},
+    "drive": {"drive": "v"},
+    "interval reversed": {"train": (3, 1)},
+    "linear": {"linear": ["q"]},
+    "cycles": {"cycles": -1.0},
+    "model": {"model": 3},
+    "no records": {"records": []},
+    "no record": {"records": [3]},
+    "inertia in a position": {
+        "model": DRIVEN,
+        "measured": "one.x",
+        "free": ["pad.k"],
+        "nuisance": ["inertia"],
+    },
 }
-group("fit", ParameterError, fitting, rows, "free")
+group("fit", fitting, rows)
 rows = {
-    "tied and not free": ("tied", ..., {"tied": ["C"]}),
-    "fixed and free": ("fixed", ..., {"fixed": {"k": 2.0}}),
-    "unknown fixed": ("fixed", ..., {"fixed": {"q": 2.0}}),
-    "fixed against the rule": ("v_c", -1.0, {"fixed": {"v_c": -1.0}}),
-    "bounds and not free": ("bounds", ..., {"bounds": {"C": (0, 1)}}),
-    "bounds reversed": ("bounds of 'k1'", ..., {"bounds": {"k": (2, 1)}}),
-    "bound": ("bounds of 'k1'", 3, {"bounds": {"k": 3}}),
-    "bounds against the rule": ("bounds of 'k1'", ..., {"bounds": {"k": (-2, -1)}}),
-    "nuisance": ("nuisance", "bias", {"nuisance": ["bias"]}),
-    "search": ("search", "anneal", {"search": "anneal"}),
-    "weight": ("weight", "all", {"weight": "all"}),
-    "begin": ("begin", "warm", {"begin": "warm"}),
-    "measured": ("measured", ..., {"measured": "x"}),
-    "drive": ("drive", "v", {"drive": "v"}),
-    "interval reversed": ("train", ..., {"train": (3, 1)}),
-    "linear": ("linear", ..., {"linear": ["q"]}),
-    "cycles": ("cycles", -1.0, {"cycles": -1.0}),
-    "model": ("model", 3, {"model": 3}),
-    "no records": ("records", [], {"records": []}),
-    "no record": ("records[0]", 3, {"records": [3]}),
-    "inertia in a position": (
-        "nuisance",
-        ...,
-        {"model": DRIVEN, "measured": "one.x", "free": ["pad.k"], "nuisance": ["inertia"]},
-    ),
+    "interval outside": {"train": (30, 40)},
+    "no force": {"records": arrays(force=None)},
+    "constant force": {"records": arrays(force=np.full(201, 2.5))},
+    "no motion": {"records": arrays(position=0.0 * T)},
+    "ten rows": {"records": arrays(time=T[:10], position=X[:10], force=F[:10])},
 }
-group("fit", ParameterError, fitting, rows)
-rows = {
-    "interval outside": ({"train": (30, 40)},),
-    "no force": ({"records": arrays(force=None)},),
-    "constant force": ({"records": arrays(force=np.full(201, 2.5))},),
-    "no motion": ({"records": arrays(position=0.0 * T)},),
-    "ten rows": ({"records": arrays(time=T[:10], position=X[:10], force=F[:10])},),
-}
-group("record to fit", RecordError, fitting, rows, "record 'rig'")
+group("record to fit", fitting, rows)
 
 
 def choosing(given: dict[str, Any]) -> None:
@@ -1163,31 +937,31 @@ def choosing(given: dict[str, Any]) -> None:
 
 
 rows = {
-    "unknown fold": ("fold", "rows", {"fold": "rows"}),
-    "negative cycles": ("cycles", -1.0, {"cycles": -1.0}),
-    "no candidates": ("candidates", ..., {"candidates": []}),
-    "number of candidates": ("candidates", 3, {"candidates": 3}),
-    "short candidate": ("candidate 'candidates[0]'", ("a", 3), {"candidates": [("a", 3)]}),
-    "name twice": ("candidates", ..., {"candidates": [("a", fitted(), ["k"])] * 2}),
-    "candidate by name that is a number": ("candidate 'one'", 1, {"candidates": {"one": 1}}),
-    "model of a candidate": ("model of candidate 'one'", 5, {"candidates": {"one": (5, ["k"])}}),
-    "interval reversed": ("train", ..., {"train": (3.0, 1.0)}),
-    "seed": ("seed", 0.5, {"seed": 0.5}),
-    "no records": ("records", [], {"records": []}),
-    "name for a record": ("records", "rig", {"records": "rig"}),
-    "one record for a fold of records": ("fold", "record", {"fold": "record"}),
-    "one amplitude": ("fold", "amplitude", {"fold": "amplitude"}),
-    "candidates that cannot be run": ("candidates", ..., {"cycles": 2.0, "most_steps": 1}),
+    "unknown fold": {"fold": "rows"},
+    "negative cycles": {"cycles": -1.0},
+    "no candidates": {"candidates": []},
+    "number of candidates": {"candidates": 3},
+    "short candidate": {"candidates": [("a", 3)]},
+    "name twice": {"candidates": [("a", fitted(), ["k"])] * 2},
+    "candidate by name that is a number": {"candidates": {"one": 1}},
+    "model of a candidate": {"candidates": {"one": (5, ["k"])}},
+    "interval reversed": {"train": (3.0, 1.0)},
+    "seed": {"seed": 0.5},
+    "no records": {"records": []},
+    "name for a record": {"records": "rig"},
+    "one record for a fold of records": {"fold": "record"},
+    "one amplitude": {"fold": "amplitude"},
+    "candidates that cannot be run": {"cycles": 2.0, "most_steps": 1},
 }
-group("choose", ParameterError, choosing, rows)
+group("choose", choosing, rows)
 rows = {
-    "too few cycles": ({"cycles": 8.0},),
-    "too few cycles for our candidates": ({"cycles": 8.0, "candidates": None},),
-    "interval outside": ({"train": (50.0, 60.0)},),
-    "no force": ({"records": arrays(force=None)},),
-    "motion that does not repeat": ({"records": arrays(position=T)},),
+    "too few cycles": {"cycles": 8.0},
+    "too few cycles for our candidates": {"cycles": 8.0, "candidates": None},
+    "interval outside": {"train": (50.0, 60.0)},
+    "no force": {"records": arrays(force=None)},
+    "motion that does not repeat": {"records": arrays(position=T)},
 }
-group("record to choose by", RecordError, choosing, rows, "record 'rig'")
+group("record to choose by", choosing, rows)
 
 
 def banking(given: dict[str, Any]) -> None:
@@ -1196,27 +970,24 @@ def banking(given: dict[str, Any]) -> None:
 
 
 rows = {
-    **{f"n is {n!r}": ("n", n, {"n": n}) for n in (0, 2.5, True, None, "4", 61)},
-    "train is 'all'": ("train", "all", {"train": "all"}),
-    **{f"records is {each!r}": ("records", each, {"records": each}) for each in ([], None)},
-    "name for a record": ("records", "rig.csv", {"records": "rig.csv"}),
-    "records with none": ("records[1]", None, {"records": [arrays(), None]}),
+    **{f"n is {n!r}": {"n": n} for n in (0, 2.5, True, None, "4", 61)},
+    "train is 'all'": {"train": "all"},
+    **{f"records is {each!r}": {"records": each} for each in ([], None)},
+    "name for a record": {"records": "rig.csv"},
+    "records with none": {"records": [arrays(), None]},
+    "smoothing": {"smoothing": -1.0},
 }
-group("initial_bank", ParameterError, banking, rows)
+group("initial_bank", banking, rows)
 rows = {
-    "smoothing": ("record 'rig'", ..., {"smoothing": -1.0}),
+    "no force": {"records": arrays(force=None)},
+    "no motion": {"records": arrays(position=np.full(201, 0.2))},
+    "constant force": {"records": arrays(force=np.full(201, 3.0))},
+    "force of the other sign": {"records": arrays(force=-F)},
+    "few rows": {"records": arrays(time=T[:12], position=X[:12], force=F[:12])},
+    "one way": {"records": arrays(time=5 * T[:100], position=T[:100], force=T[:100])},
+    "interval outside": {"train": (100.0, 200.0)},
 }
-group("initial_bank", RecordError, banking, rows)
-rows = {
-    "no force": ({"records": arrays(force=None)},),
-    "no motion": ({"records": arrays(position=np.full(201, 0.2))},),
-    "constant force": ({"records": arrays(force=np.full(201, 3.0))},),
-    "force of the other sign": ({"records": arrays(force=-F)},),
-    "few rows": ({"records": arrays(time=T[:12], position=X[:12], force=F[:12])},),
-    "one way": ({"records": arrays(time=5 * T[:100], position=T[:100], force=T[:100])},),
-    "interval outside": ({"train": (100.0, 200.0)},),
-}
-group("record for an initial bank", RecordError, banking, rows, "record 'rig'")
+group("record for an initial bank", banking, rows)
 
 
 def exciting(given: dict[str, Any]) -> None:
@@ -1225,19 +996,19 @@ def exciting(given: dict[str, Any]) -> None:
 
 
 rows = {
-    "no stroke": ("stroke", 0.0, {"stroke": 0.0}),
-    "infinite stroke": ("stroke", INF, {"stroke": INF}),
-    "stroke of no float": ("stroke", 1e-200, {"stroke": 1e-200}),
-    "word": ("stroke", "long", {"stroke": "long"}),
-    "no speeds": ("", ..., {"speeds": []}),
-    "speed of zero": ("speeds[1] (element 2)", 0.0, {"speeds": [1e-3, 0.0]}),
-    "endless speed": ("speeds[0] (element 1)", 1e300, {"speeds": [1e300]}),
-    "one speed": ("", ..., {"speeds": 1e-3}),
-    "rate": ("rate", 0.0, {"rate": 0.0}),
-    "acceleration": ("acceleration", -1.0, {"acceleration": -1.0}),
-    "motion without end": ("excite", ..., {"stroke": 1.0, "speeds": [1e-9, 1.0]}),
+    "no stroke": {"stroke": 0.0},
+    "infinite stroke": {"stroke": INF},
+    "stroke of no float": {"stroke": 1e-200},
+    "word": {"stroke": "long"},
+    "no speeds": {"speeds": []},
+    "speed of zero": {"speeds": [1e-3, 0.0]},
+    "endless speed": {"speeds": [1e300]},
+    "one speed": {"speeds": 1e-3},
+    "rate": {"rate": 0.0},
+    "acceleration": {"acceleration": -1.0},
+    "motion without end": {"stroke": 1.0, "speeds": [1e-9, 1.0]},
 }
-group("excite", ParameterError, exciting, rows)
+group("excite", exciting, rows)
 
 
 # --------------------------------------------------------------------------- charts
@@ -1286,28 +1057,15 @@ def chart_bytes(content: bytes) -> None:
 
 
 rows = {
-    "unknown state": ("chart 'stiction', edge 'arrest'", ..., 'to = "stuck"', 'to = "stick"'),
-    "action": ("chart 'stiction', edge 'arrest', action", ..., 'do.v = "0"', 'do.q = "0"'),
-    "name used twice": ("chart 'stiction'", ..., '"arrest"', '"release"'),
-    "no force": ("chart 'stiction', state 'slip'", ..., 'outputs.F = "level"\n', ""),
-    "force of a locked state": (
-        "state 'stuck'",
-        ...,
-        "locked = true",
-        'locked = true\noutputs.F = "1"',
-    ),
-    "bad name": ("chart 'stiction'", ..., '"slip"\nout', '"is_x"\nout'),
-    "rule": ("own.toml: line 6, parameter.1.rule", ..., PLAIN, TABLES),
-    "loop": ("chart 'stiction', state 'slip', output 'F'", ..., '"level"', '"F"'),
-    "place of no state": (
-        "chart 'stiction': layout",
-        ...,
-        'do.v = "0"\n',
-        'do.v = "0"\n[layout]\nslop = [0, 0]\n',
-    ),
-}
-group("chart file", ChartError, chart_file, rows)
-rows = {
+    "unknown state": ('to = "stuck"', 'to = "stick"'),
+    "action": ('do.v = "0"', 'do.q = "0"'),
+    "name used twice": ('"arrest"', '"release"'),
+    "no force": ('outputs.F = "level"\n', ""),
+    "force of a locked state": ("locked = true", 'locked = true\noutputs.F = "1"'),
+    "bad name": ('"slip"\nout', '"is_x"\nout'),
+    "rule": (PLAIN, TABLES),
+    "loop": ('"level"', '"F"'),
+    "place of no state": ('do.v = "0"\n', 'do.v = "0"\n[layout]\nslop = [0, 0]\n'),
     "unknown key": ("guard", "gard"),
     "wrong type": ("locked = true", "locked = 1"),
     "word for true": ("locked = true", 'locked = "yes"'),
@@ -1318,36 +1076,25 @@ rows = {
     "missing key": ('to = "slip"\n', ""),
     "unknown table": ("[[state]]", "[[stat]]"),
     "both kinds of parameters": (PLAIN, PLAIN + "\n[[parameter]]\nname = 'k'"),
+    "unknown name": ("F > F_s", "F > F_k"),
+    "let": ('"F_c * sgn(v)"', '"F_c * (v"'),
 }
-group("chart file", ChartError, chart_file, rows, "own.toml")
+group("chart file", chart_file, rows)
 rows = {
-    "unknown name": ("edge 'release', guard, column 5", ..., "F > F_s", "F > F_k"),
-    "let": ("chart 'stiction', let 'level', column 7", ..., '"F_c * sgn(v)"', '"F_c * (v"'),
+    "empty": b"",
+    "no TOML": b"name = ",
+    "no text": b"\xff\xfe",
+    "endless key": b".".join([b"a"] * 500) + b" = 1",
+    "long array": b'name = "a"\nstate = [\n' + b"{},\n" * 4_000 + b"]\nq = 1\n",
+    "too large": b"#" * 1_100_000,
+    "deep": b"name = " + b"[" * 5000,
+    "archive": b"PK\x03\x04\x14\x00",
+    "JSON": b'{"state": []}',
+    "XML": b'<?xml version="1.0"?><scxml/>',
 }
-group("chart file", ExpressionError, chart_file, rows)
-rows = {
-    "empty": (b"",),
-    "no TOML": (b"name = ",),
-    "no text": (b"\xff\xfe",),
-    "endless key": (b".".join([b"a"] * 500) + b" = 1",),
-    "long array": (b'name = "a"\nstate = [\n' + b"{},\n" * 4_000 + b"]\nq = 1\n",),
-    "too large": (b"#" * 1_100_000,),
-    "deep": (b"name = " + b"[" * 5000,),
-    "archive": (b"PK\x03\x04\x14\x00",),
-    "JSON": (b'{"state": []}',),
-    "XML": (b'<?xml version="1.0"?><scxml/>',),
-}
-group("file that is no chart", ChartError, chart_bytes, rows, "own.toml")
-rows = {
-    "missing": ("none.toml", ..., "none.toml"),
-    "folder": (".", ..., "."),
-    "zero byte": ("a\x00b.toml", ..., "a\0b.toml"),
-}
-group("path of a chart", ChartError, Chart.load, rows)
-rows = {
-    "number": ("path", 5, 5),
-}
-group("path of a chart", ParameterError, Chart.load, rows)
+group("file that is no chart", chart_bytes, rows)
+rows = {"missing": "none.toml", "folder": ".", "zero byte": "a\0b.toml", "number": 5}
+group("path of a chart", Chart.load, rows)
 
 
 def document(text: str) -> None:
@@ -1357,15 +1104,15 @@ def document(text: str) -> None:
 
 
 rows = {
-    "type definition": ('<!DOCTYPE scxml><scxml xmlns="http://www.w3.org/2005/07/scxml"/>',),
-    "larger than a chart": (" " * 11_000_000,),
+    "type definition": '<!DOCTYPE scxml><scxml xmlns="http://www.w3.org/2005/07/scxml"/>',
+    "larger than a chart": " " * 11_000_000,
     "20,000 states": (
         '<scxml xmlns="http://www.w3.org/2005/07/scxml">'
         + "".join(f'<state id="s{i}"><transition target="s0"/></state>' for i in range(20_000))
-        + "</scxml>",
+        + "</scxml>"
     ),
 }
-group("document", ChartError, document, rows, "own.toml")
+group("document", document, rows)
 SCXML = '<scxml xmlns="http://www.w3.org/2005/07/scxml">{}</scxml>'
 
 
@@ -1376,18 +1123,18 @@ def inside(text: str) -> None:
 
 TWICE = '<assign location="n" expr="1"/>' * 2
 rows = {
-    "parallel states": ("state 'a'", ..., "<parallel/>"),
-    "message": ("state 'a', onentry", ..., '<onentry><send event="b" delay="1s"/></onentry>'),
-    "no end": ("done.state.a", ..., '<transition event="done.state.a" target="a"/>'),
-    "any event": ("transition *", ..., '<transition event="*" target="a"/>'),
-    "two targets": ("transition 1", ..., '<transition target="a b"/>'),
-    "no target, with exit": ("1", ..., f"<onexit>{TWICE[:31]}</onexit><transition/>"),
-    "assigned twice": ("onentry", ..., f"<onentry>{TWICE}</onentry>"),
-    "data without a value": ("<data id='n'>", ..., '<datamodel><data id="n"/></datamodel>'),
+    "parallel states": "<parallel/>",
+    "message": '<onentry><send event="b" delay="1s"/></onentry>',
+    "no end": '<transition event="done.state.a" target="a"/>',
+    "any event": '<transition event="*" target="a"/>',
+    "two targets": '<transition target="a b"/>',
+    "no target, with exit": f"<onexit>{TWICE[:31]}</onexit><transition/>",
+    "assigned twice": f"<onentry>{TWICE}</onentry>",
+    "data without a value": '<datamodel><data id="n"/></datamodel>',
 }
-group("state of a document", ChartError, inside, rows)
-rows = {"words": ("", ..., "<datamodel><data id='n' expr='\"red\"'/></datamodel>")}
-group("data of a document", ExpressionError, inside, rows)
+group("state of a document", inside, rows)
+rows = {"words": "<datamodel><data id='n' expr='\"red\"'/></datamodel>"}
+group("data of a document", inside, rows)
 
 
 def machine(kind: Callable[..., Any], second: Any, callbacks: Any, more: Mapping[str, Any]) -> None:
@@ -1398,27 +1145,20 @@ def machine(kind: Callable[..., Any], second: Any, callbacks: Any, more: Mapping
 
 
 rows = {
-    "awaited": ("machine", ..., AsyncMachine, "b", {}, {}),
-    "parallel": (
-        "state 'b'",
-        ...,
-        HierarchicalMachine,
-        {"name": "b", "parallel": ["c", "d"]},
-        {},
-        {},
-    ),
-    "no guard": ("trigger 'go'", ..., Machine, "b", {}, {}),
+    "awaited": (AsyncMachine, "b", {}, {}),
+    "parallel": (HierarchicalMachine, {"name": "b", "parallel": ["c", "d"]}, {}, {}),
+    "no guard": (Machine, "b", {}, {}),
 }
-group("machine", ChartError, machine, rows)
+group("machine", machine, rows)
 rows = {
-    "condition": ("trigger 'go'", ..., {}, {"conditions": "is_hot"}),
-    "action": ("trigger 'go'", ..., {}, {"after": "count"}),
-    "before the condition": ("trigger 'go'", ..., {"look": {"n": "1"}}, {"prepare": "look"}),
-    "no such function": ("callbacks", ..., {"is_hot": "v > 1"}, {}),
-    "no table": ("callbacks", 3, 3, {}),
-    "mapping for a condition": ("'go'", ..., {"is_hot": {"n": "1"}}, {"conditions": "is_hot"}),
+    "condition": ({}, {"conditions": "is_hot"}),
+    "action": ({}, {"after": "count"}),
+    "before the condition": ({"look": {"n": "1"}}, {"prepare": "look"}),
+    "no such function": ({"is_hot": "v > 1"}, {}),
+    "no table": (3, {}),
+    "mapping for a condition": ({"is_hot": {"n": "1"}}, {"conditions": "is_hot"}),
 }
-group("function of a machine", ChartError, partial(machine, Machine, "b"), rows)
+group("function of a machine", partial(machine, Machine, "b"), rows)
 STICK = State("stick", flow={"z": "v"})
 SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})
 GO = Transition("go", "stick", "slip", guard="z >= s and v > v_c")
@@ -1456,152 +1196,110 @@ def state(**changes: Any) -> dict[str, Any]:
 
 
 rows = {
-    "unknown source": (edge(source="glue"),),
-    "line end in a name": (edge(source="gl\nue"),),
-    "unknown one of two sources": (edge(source=("stick", "glue")),),
-    "unknown state inside another": (inside(**edge(target="slip.three")),),
-    "state inside another by its name alone": (inside(**edge(target="two")),),
-    "age of two levels": (inside(**edge(source=("stick", "slip"), guard="after(1)")),),
+    "unknown source": edge(source="glue"),
+    "line end in a name": edge(source="gl\nue"),
+    "unknown one of two sources": edge(source=("stick", "glue")),
+    "unknown state inside another": inside(**edge(target="slip.three")),
+    "state inside another by its name alone": inside(**edge(target="two")),
+    "age of two levels": inside(**edge(source=("stick", "slip"), guard="after(1)")),
+    "flow of no variable": state(flow={"z": "v", "w": "1"}),
+    "entry of no variable": state(entry={"w": "1"}),
+    "action of no variable": edge(actions={"s": "0"}),
+    "no outputs": {"outputs": {}},
+    "text for the outputs": {"outputs": "k * z"},
+    "unknown output": {"outputs": {"G": "k"}},
+    "unknown output of a state": state(outputs={"G": "k"}),
+    "force of a locked state": state(locked=True, outputs={"F": "k"}),
+    "F in a let": {"let": {"pull": "abs(F)"}},
+    "F in a flow": state(flow={"z": "F"}),
+    "a in a force": state(outputs={"F": "a"}),
+    "layout of no state": {"layout": {"stick": (0, 0), "slop": (9, 0)}},
+    "layout without a state": {"layout": {"stick": (0, 0)}},
+    "layout without numbers": {"layout": {"stick": (0, 0), "slip": (9, "right")}},
+    "layout that is no mapping": {"layout": "right"},
+    "start of no variable": {"initial": {"y": 1.0}},
+    "start that is no number": {"initial": {"z": "far"}},
+    "start that is no mapping": {"initial": 1.0},
+    "let of a parameter": {"let": {"u": "k * z"}, "contact_outputs": {"F": "F + u"}},
+    "no states": {"states": (), "transitions": ()},
+    "outputs by state": {"outputs": {"F": {"stick": "k * z"}}},
+    "let and parameter": {"let": {"k": "1"}},
+    "force and parameter": {"velocities": ("v", "w"), "parameters": (*K, "F_w")},
+    "text for a state": {"states": (STICK, "slip")},
+    "none for an edge": {"transitions": (GO, None)},
+    "parameter twice": {"parameters": (*K, "k")},
+    "variable and parameter": {"parameters": (*K, "z")},
+    "derivative and parameter": {"parameters": (*K, "dz")},
+    "state twice": {"states": (STICK, STICK)},
+    "state inside and parameter": inside(parameters=(*K, "slip__two")),
+    "age and parameter": inside(parameters=(*K, "slip__age")),
+    "edge of a history and parameter": {
+        "states": (STICK, dataclasses.replace(SLIP, states=(State("a"), State("b")), history=True)),
+        "parameters": (*K, "go__b"),
+    },
+    "path for a name": inside(State("one.two")),
+    "state and edge": edge(name="slip"),
+    "parameter and edge": edge(name="k"),
+    "parameter t": {"parameters": (*K, "t")},
+    "parameter v": {"inputs": ("s",), "parameters": ("v",)},
+    "edge x": edge(name="x"),
+    "empty name": {"parameters": (*K, "")},
+    "keyword": {"parameters": (*K, "if")},
+    "number for a parameter": {"parameters": (*K, 3)},
+    "private name": {"parameters": (*K, "_k")},
+    "method of an edge": state(name="to_slip"),
+    "accent beside its letter": {"parameters": (*K, "e\u0301")},
+    "letter of mathematics": edge(name="\U0001d467"),
+    "rule of an unknown name": {"parameters": ("k", "C", Parameter("v_c", "m/s", "< v_max"))},
+    "parameters as a text": {"parameters": "k C"},
+    "a state for states": {"states": STICK},
 }
-group("chart", ChartError, chart, rows, "chart 'rubber', edge 'go'")
-rows = {
-    "flow of no variable": ("state 'slip', flow", ..., state(flow={"z": "v", "w": "1"})),
-    "entry of no variable": ("chart 'rubber', state 'slip', entry", ..., state(entry={"w": "1"})),
-    "action of no variable": ("chart 'rubber', edge 'go', action", ..., edge(actions={"s": "0"})),
-    "no outputs": ("chart 'rubber', state 'stick'", ..., {"outputs": {}}),
-    "text for the outputs": ("chart 'rubber': outputs", "k * z", {"outputs": "k * z"}),
-    "unknown output": ("chart 'rubber', outputs", ..., {"outputs": {"G": "k"}}),
-    "unknown output of a state": ("state 'slip', outputs", ..., state(outputs={"G": "k"})),
-    "force of a locked state": ("state 'slip'", ..., state(locked=True, outputs={"F": "k"})),
-    "F in a let": ("chart 'rubber', let 'pull'", ..., {"let": {"pull": "abs(F)"}}),
-    "F in a flow": ("chart 'rubber', state 'slip', flow of 'z'", ..., state(flow={"z": "F"})),
-    "a in a force": ("chart 'rubber', state 'slip', output 'F'", ..., state(outputs={"F": "a"})),
-    "layout of no state": (
-        "chart 'rubber': layout",
-        ...,
-        {"layout": {"stick": (0, 0), "slop": (9, 0)}},
-    ),
-    "layout without a state": ("chart 'rubber': layout", ..., {"layout": {"stick": (0, 0)}}),
-    "layout without numbers": (
-        "chart 'rubber': layout, 'slip'",
-        (9, "right"),
-        {"layout": {"stick": (0, 0), "slip": (9, "right")}},
-    ),
-    "layout that is no mapping": ("chart 'rubber': layout", "right", {"layout": "right"}),
-    "start of no variable": ("chart 'rubber': initial", ..., {"initial": {"y": 1.0}}),
-    "start that is no number": (
-        "chart 'rubber': initial, 'z'",
-        "far",
-        {"initial": {"z": "far"}},
-    ),
-    "start that is no mapping": ("chart 'rubber': initial", 1.0, {"initial": 1.0}),
-    "let of a parameter": (
-        "contact_outputs 'F'",
-        ...,
-        {"let": {"u": "k * z"}, "contact_outputs": {"F": "F + u"}},
-    ),
-}
-group("chart", ChartError, chart, rows)
-rows = {
-    "no states": ({"states": (), "transitions": ()},),
-    "outputs by state": ({"outputs": {"F": {"stick": "k * z"}}},),
-    "let and parameter": ({"let": {"k": "1"}},),
-    "force and parameter": ({"velocities": ("v", "w"), "parameters": (*K, "F_w")},),
-    "text for a state": ({"states": (STICK, "slip")},),
-    "none for an edge": ({"transitions": (GO, None)},),
-    "parameter twice": ({"parameters": (*K, "k")},),
-    "variable and parameter": ({"parameters": (*K, "z")},),
-    "derivative and parameter": ({"parameters": (*K, "dz")},),
-    "state twice": ({"states": (STICK, STICK)},),
-    "state inside and parameter": (inside(parameters=(*K, "slip__two")),),
-    "age and parameter": (inside(parameters=(*K, "slip__age")),),
-    "edge of a history and parameter": (
-        {
-            "states": (
-                STICK,
-                dataclasses.replace(SLIP, states=(State("a"), State("b")), history=True),
-            ),
-            "parameters": (*K, "go__b"),
-        },
-    ),
-    "path for a name": (inside(State("one.two")),),
-    "state and edge": (edge(name="slip"),),
-    "parameter and edge": (edge(name="k"),),
-    "parameter t": ({"parameters": (*K, "t")},),
-    "parameter v": ({"inputs": ("s",), "parameters": ("v",)},),
-    "edge x": (edge(name="x"),),
-    "empty name": ({"parameters": (*K, "")},),
-    "keyword": ({"parameters": (*K, "if")},),
-    "number for a parameter": ({"parameters": (*K, 3)},),
-    "private name": ({"parameters": (*K, "_k")},),
-    "method of an edge": (state(name="to_slip"),),
-    "accent beside its letter": ({"parameters": (*K, "e\u0301")},),
-    "letter of mathematics": (edge(name="\U0001d467"),),
-}
-group("chart", ChartError, chart, rows, "chart 'rubber'")
-rows = {
-    "rule of an unknown name": ({"parameters": ("k", "C", Parameter("v_c", "m/s", "< v_max"))},),
-    "parameters as a text": ({"parameters": "k C"},),
-    "a state for states": ({"states": STICK},),
-}
-group("chart", ChartError, chart, rows, "")
+group("chart", chart, rows)
 rows = {"states inside without a name": (State("stick"), State("slip"))}
-group("state", ChartError, lambda *inside: State("on", *inside), rows, "state 'on'")
+group("state", lambda *inside: State("on", *inside), rows)
 rows = {
-    "state of a machine in a guard": ("column 1", ..., edge(guard="is_in(pad.stuck) > 0")),
-    "count in a guard": ("column 1", ..., edge(guard="count(slip) > 2")),
-    "unknown name in a guard": ("guard, column 12", ..., edge(guard="z >= s and u > v_c")),
-    "function that is a parameter": (
-        "guard, column 1",
-        ...,
-        {"parameters": (*K, "mod"), **edge(guard="mod(z, 1) > s")},
-    ),
-    "time with a unit": ("column 10", ..., edge(guard="after(2, sec)")),
-    "time with a unit after a blank": ("column 10", ..., edge(guard="after(20 ms)")),
-    "after without a time": ("column 1", ..., edge(guard="after()")),
-    "after of two": ("column 11", ..., edge(guard="z >= s or after(2, s_0)")),
-    "after as a number": ("column 5", ..., edge(guard="1 < after(2)")),
-    "guard of equality": ("chart 'rubber', edge 'go', guard, column 6", ..., edge(guard="z == s")),
-    "decimal comma in a guard": ("guard, column 7", ..., edge(guard="z >= 0,8 * s")),
-    "capitals in a guard": ("guard, column 8", ..., edge(guard="z >= s AND v > v_c")),
-    "parenthesis that stays open": ("guard, column 4", ..., edge(guard="abs(z >= s")),
-    "flow that is a condition": ("flow of 'z', column 1", ..., state(flow={"z": "v > 0"})),
-    "two operators": ("state 'slip', entry 'z', column 4", ..., state(entry={"z": "1 +* v"})),
-    "two names": ("edge 'go', action 'z', column 3", ..., edge(actions={"z": "s s"})),
-    "unknown name in an output": ("output 'F', column 5", ..., {"outputs": {"F": "k * zz"}}),
-    "contact's output": ("column 5", ..., {"contact_outputs": {"F": "F + k * z"}}),
-    "force in a condition that lasts": (
-        "edge 'go', guard, duration, column 1",
-        ...,
-        edge(guard="duration(F > 1) > 2"),
-    ),
-    "how long a number lasts": ("edge 'go', guard, column 10", ..., edge(guard="duration(z) > 2")),
-    "how long two last": ("guard, column 1", ..., edge(guard="duration(v > 0, 1) > 1")),
-    "how long, without a comparison": ("guard, column 1", ..., edge(guard="duration(v > 0)")),
-    "how long, denied": ("guard, column 5", ..., edge(guard="not duration(v > 0)")),
-    "duration that is a parameter": (
-        "guard, column 1",
-        ...,
-        {"parameters": (*K, "duration"), **edge(guard="duration(v > 0) > 1")},
-    ),
-    "bytes for a flow": ("state 'slip', flow of 'z', column 1", ..., state(flow={"z": b"v"})),
+    "state of a machine in a guard": edge(guard="is_in(pad.stuck) > 0"),
+    "count in a guard": edge(guard="count(slip) > 2"),
+    "unknown name in a guard": edge(guard="z >= s and u > v_c"),
+    "function that is a parameter": {"parameters": (*K, "mod"), **edge(guard="mod(z, 1) > s")},
+    "time with a unit": edge(guard="after(2, sec)"),
+    "time with a unit after a blank": edge(guard="after(20 ms)"),
+    "after without a time": edge(guard="after()"),
+    "after of two": edge(guard="z >= s or after(2, s_0)"),
+    "after as a number": edge(guard="1 < after(2)"),
+    "guard of equality": edge(guard="z == s"),
+    "decimal comma in a guard": edge(guard="z >= 0,8 * s"),
+    "capitals in a guard": edge(guard="z >= s AND v > v_c"),
+    "parenthesis that stays open": edge(guard="abs(z >= s"),
+    "flow that is a condition": state(flow={"z": "v > 0"}),
+    "two operators": state(entry={"z": "1 +* v"}),
+    "two names": edge(actions={"z": "s s"}),
+    "unknown name in an output": {"outputs": {"F": "k * zz"}},
+    "contact's output": {"contact_outputs": {"F": "F + k * z"}},
+    "force in a condition that lasts": edge(guard="duration(F > 1) > 2"),
+    "how long a number lasts": edge(guard="duration(z) > 2"),
+    "how long two last": edge(guard="duration(v > 0, 1) > 1"),
+    "how long, without a comparison": edge(guard="duration(v > 0)"),
+    "how long, denied": edge(guard="not duration(v > 0)"),
+    "duration that is a parameter": {
+        "parameters": (*K, "duration"),
+        **edge(guard="duration(v > 0) > 1"),
+    },
+    "bytes for a flow": state(flow={"z": b"v"}),
+    "guard that is a number": edge(guard="z"),
+    "derivative in a guard": edge(guard="dz > 0"),
+    "empty guard": edge(guard=""),
+    "attribute": edge(guard="\u00e9 > z.real"),
+    "no guard": edge(guard=None),
 }
-group("text of a chart", ExpressionError, chart, rows)
+group("text of a chart", chart, rows)
 rows = {
-    "guard that is a number": (edge(guard="z"),),
-    "derivative in a guard": (edge(guard="dz > 0"),),
-    "empty guard": (edge(guard=""),),
-    "attribute": (edge(guard="\u00e9 > z.real"),),
-    "no guard": (edge(guard=None),),
+    "state that is unknown": lambda: chart({}).state_index("slide"),
+    "edge that is unknown": lambda: chart({}).guard_text("slide"),
+    "edge that is none": lambda: chart({}).guard_text(None),
+    "edge of none": lambda: chart({"transitions": ()}).guard_text("go"),
 }
-group("text of a chart", ExpressionError, chart, rows, "chart 'rubber', edge 'go', guard, column 1")
-rows = {
-    "state that is unknown": (lambda: chart({}).state_index("slide"),),
-    "edge that is unknown": (lambda: chart({}).guard_text("slide"),),
-    "edge that is none": (lambda: chart({}).guard_text(None),),
-    "edge of none": (lambda: chart({"transitions": ()}).guard_text("go"),),
-}
-group("part of a chart", ChartError, called, rows, "")
+group("part of a chart", called, rows)
 
 
 def nest() -> State:
@@ -1613,50 +1311,24 @@ def nest() -> State:
 
 
 rows = {
-    "part that no state has": (
-        "state 'stick'",
-        ...,
-        lambda: State("stick", flow={"z": "v"}, during="z = 0"),
+    "part that no state has": lambda: State("stick", flow={"z": "v"}, during="z = 0"),
+    "edges of composite states without end": lambda: chart(
+        inside(*(State(f"s{i}") for i in range(2500)), **edge(source="slip"))
     ),
-    "edges of composite states without end": (
-        "chart 'rubber'",
-        ...,
-        lambda: chart(inside(*(State(f"s{i}") for i in range(2500)), **edge(source="slip"))),
-    ),
-    "state inside twice": ("state 'slip'", ..., lambda: inside(STICK, STICK)),
-    "history of nothing": ("state 'slip'", ..., lambda: State("slip", history=True)),
-    "deep history": (
-        "state 'slip': history",
-        "deep",
-        lambda: State("slip", states=(STICK,), history="deep"),  # type: ignore[arg-type]
-    ),
-    "initial state elsewhere": (
-        "state 'slip'",
-        ...,
-        lambda: State("slip", states=(STICK,), initial="stuck"),
-    ),
-    "text for a state inside": ("state 'slip'", ..., lambda: State("slip", states=("stick",))),  # type: ignore[arg-type]
-    "states that nest without end": ("state 's7'", ..., nest),
-    "argument of transitions": (
-        "Transition",
-        ...,
-        lambda: call(Transition, trigger="go", source="stick", dest="slip"),
-    ),
-    "second argument of transitions": (
-        "transition 'go'",
-        ...,
-        lambda: call(Transition, "go", "stick", dest="slip"),
-    ),
-    "edge without a guard": (
-        "edge 'go'",
-        ...,
-        lambda: call(Transition, "go", "stick", "slip"),
-    ),
-    "locked by a number": ("state 'slip': locked", 1, lambda: State("slip", locked=1)),
-    "edge from nowhere": ("edge 'go'", ..., lambda: Transition("go", (), "slip", guard="v > 0")),
-    "name that is none": ("chart 5: name", 5, lambda: Chart(5, states=(), outputs={})),
+    "state inside twice": lambda: inside(STICK, STICK),
+    "history of nothing": lambda: State("slip", history=True),
+    "deep history": lambda: State("slip", states=(STICK,), history="deep"),
+    "initial state elsewhere": lambda: State("slip", states=(STICK,), initial="stuck"),
+    "text for a state inside": lambda: State("slip", states=("stick",)),  # type: ignore[arg-type]
+    "states that nest without end": (nest,),
+    "argument of transitions": lambda: call(Transition, trigger="go", source="stick", dest="slip"),
+    "second argument of transitions": lambda: call(Transition, "go", "stick", dest="slip"),
+    "edge without a guard": lambda: call(Transition, "go", "stick", "slip"),
+    "locked by a number": lambda: State("slip", locked=1),
+    "edge from nowhere": lambda: Transition("go", (), "slip", guard="v > 0"),
+    "name that is none": lambda: Chart(5, states=(), outputs={}),
 }
-group("part of a chart", ChartError, called, rows)
+group("part of a chart", called, rows)
 
 
 def call(kind: Any, *args: object, **given: object) -> object:
@@ -1683,9 +1355,8 @@ rows = {
 }
 group(
     "argument",
-    ParameterError,
     lambda args, given: call(*args, **given),
-    {name: (place, ..., args, given) for name, (place, args, given) in rows.items()},
+    {name: (args, given) for name, (place, args, given) in rows.items()},
 )
 
 
@@ -1750,56 +1421,43 @@ def pushed(mass: Any) -> Slider:
 
 
 rows = {
-    "curve with F_c = 0": ("F_c", 0.0, curve, {"F_c": 0}),
-    "curve with F_c = NAN": ("F_c", NAN, curve, {"F_c": NAN}),
-    "curve with F_s = INF": ("F_s", INF, curve, {"F_s": INF}),
-    "curve with v_s = 0": ("v_s", 0.0, curve, {"v_s": 0}),
-    "curve with v_s = 'fast'": ("v_s", "fast", curve, {"v_s": "fast"}),
-    "curve with v_s = None": ("v_s", None, curve, {"v_s": None}),
-    "bank with k = (40, 0)": ("k[1] (element 2)", 0.0, bank, {"k": (40, 0)}),
-    "bank with k = (NAN, 1)": ("k[0] (element 1)", NAN, bank, {"k": (NAN, 1)}),
-    "bank with k = ('a', 'b')": ("k", ("a", "b"), bank, {"k": ("a", "b")}),
-    "bank with k = [[1], [1, 2]]": ("k", [[1], [1, 2]], bank, {"k": [[1], [1, 2]]}),
-    "bank with sigma = (1, -2)": ("sigma[1] (element 2)", -2.0, bank, {"sigma": (1, -2)}),
-    "bank with C = (0.1, INF)": ("C[1] (element 2)", INF, bank, {"C": (0.1, INF)}),
-    "bank with weights = (1, 0)": ("weights[1] (element 2)", 0.0, bank, {"weights": (1, 0)}),
-    "bank with v_c = 0": ("v_c", 0.0, bank, {"v_c": 0}),
-    "bank with stribeck = None": ("stribeck", None, bank, {"stribeck": None}),
-    "shares with alpha = (0.5, 0.4)": ("alpha", ..., shares, {"alpha": (0.5, 0.4)}),
-    "shares with alpha = (1.0, 0.0)": ("alpha[1] (element 2)", 0.0, shares, {"alpha": (1.0, 0.0)}),
-    "shares with C = -1": ("C", -1.0, shares, {"C": -1}),
-    "shares with C = NAN": ("C", NAN, shares, {"C": NAN}),
-    "lugre with sigma_0 = 0": ("sigma_0", 0.0, lugre, {"sigma_0": 0}),
-    "lugre with stribeck = 3": ("stribeck", 3, lugre, {"stribeck": 3}),
-    "own with n = 2.5": ("n", 2.5, own_model, {"n": 2.5}),
-    "own with n = 'two'": ("n", "two", own_model, {"n": "two"}),
-    "own with weights = (1, -1)": ("weights[1] (element 2)", -1.0, own_model, {"weights": (1, -1)}),
-    "own with stribeck = None": ("signed law'", ..., own_model, {"stribeck": None}),
-    "own with values = {'k': NAN}": ("k", NAN, own_model, {"values": {"k": NAN}}),
-    "own with values = {'k': '100'}": ("k", "100", own_model, {"values": {"k": "100"}}),
-    "own with values = {'k': None}": ("k", None, own_model, {"values": {"k": None}}),
-    "own with values = {'v_c': [1e-6, 1e-6]}": (
-        "v_c",
-        [1e-06, 1e-06],
-        own_model,
-        {"values": {"v_c": [1e-6, 1e-6]}},
-    ),
-    "own with values = {'k': [[1], [1, 2]]}": (
-        "k",
-        [[1], [1, 2]],
-        own_model,
-        {"values": {"k": [[1], [1, 2]]}},
-    ),
-    "ruled with a = 3": ("a", 3.0, ruled, {"a": 3}),
-    "ruled with a = -1": ("a", -1.0, ruled, {"a": -1}),
-    "pushed with mass = 0": ("mass", 0.0, pushed, {"mass": 0}),
-    "pulled with mass = -1": ("mass", -1.0, pulled, {"mass": -1}),
-    "pulled with stiffness = 0": ("stiffness", 0.0, pulled, {"stiffness": 0}),
-    "model of a name": ("chart", "dahl", ChartModel, {"chart": "dahl", "values": {}}),
-    "GMS without parameters": ("parameters", {}, GMS, {"parameters": {}, "law": "signed"}),
-}
-group("parameter", ParameterError, lambda make, given: make(**given), rows)
-rows = {
+    "curve with F_c = 0": (curve, {"F_c": 0}),
+    "curve with F_c = NAN": (curve, {"F_c": NAN}),
+    "curve with F_s = INF": (curve, {"F_s": INF}),
+    "curve with v_s = 0": (curve, {"v_s": 0}),
+    "curve with v_s = 'fast'": (curve, {"v_s": "fast"}),
+    "curve with v_s = None": (curve, {"v_s": None}),
+    "bank with k = (40, 0)": (bank, {"k": (40, 0)}),
+    "bank with k = (NAN, 1)": (bank, {"k": (NAN, 1)}),
+    "bank with k = ('a', 'b')": (bank, {"k": ("a", "b")}),
+    "bank with k = [[1], [1, 2]]": (bank, {"k": [[1], [1, 2]]}),
+    "bank with sigma = (1, -2)": (bank, {"sigma": (1, -2)}),
+    "bank with C = (0.1, INF)": (bank, {"C": (0.1, INF)}),
+    "bank with weights = (1, 0)": (bank, {"weights": (1, 0)}),
+    "bank with v_c = 0": (bank, {"v_c": 0}),
+    "bank with stribeck = None": (bank, {"stribeck": None}),
+    "shares with alpha = (0.5, 0.4)": (shares, {"alpha": (0.5, 0.4)}),
+    "shares with alpha = (1.0, 0.0)": (shares, {"alpha": (1.0, 0.0)}),
+    "shares with C = -1": (shares, {"C": -1}),
+    "shares with C = NAN": (shares, {"C": NAN}),
+    "lugre with sigma_0 = 0": (lugre, {"sigma_0": 0}),
+    "lugre with stribeck = 3": (lugre, {"stribeck": 3}),
+    "own with n = 2.5": (own_model, {"n": 2.5}),
+    "own with n = 'two'": (own_model, {"n": "two"}),
+    "own with weights = (1, -1)": (own_model, {"weights": (1, -1)}),
+    "own with stribeck = None": (own_model, {"stribeck": None}),
+    "own with values = {'k': NAN}": (own_model, {"values": {"k": NAN}}),
+    "own with values = {'k': '100'}": (own_model, {"values": {"k": "100"}}),
+    "own with values = {'k': None}": (own_model, {"values": {"k": None}}),
+    "own with values = {'v_c': [1e-6, 1e-6]}": (own_model, {"values": {"v_c": [1e-6, 1e-6]}}),
+    "own with values = {'k': [[1], [1, 2]]}": (own_model, {"values": {"k": [[1], [1, 2]]}}),
+    "ruled with a = 3": (ruled, {"a": 3}),
+    "ruled with a = -1": (ruled, {"a": -1}),
+    "pushed with mass = 0": (pushed, {"mass": 0}),
+    "pulled with mass = -1": (pulled, {"mass": -1}),
+    "pulled with stiffness = 0": (pulled, {"stiffness": 0}),
+    "model of a name": (ChartModel, {"chart": "dahl", "values": {}}),
+    "GMS without parameters": (GMS, {"parameters": {}, "law": "signed"}),
     "curve with F_s = 0.5": (curve, {"F_s": 0.5}),
     "bank replaced with q = 1": (lambda **new: bank().replaced(**new), {"q": 1.0}),
     "bank replaced with Fs = 1": (lambda **new: bank().replaced(**new), {"Fs": 1.0}),
@@ -1823,45 +1481,30 @@ rows = {
         {"chart": one_state("q"), "values": {"q": [1] * 3}, "n": 2},
     ),
 }
-group("parameter", ParameterError, lambda make, given: make(**given), rows, "")
+group("parameter", lambda make, given: make(**given), rows)
 rows = {
-    "word": ("parameter 'k', rule 'positive'", ..., "k", {"rule": "positive"}),
-    "bound without a number": ("parameter 'k', rule '> '", ..., "k", {"rule": "> "}),
-    "half a rule": ("parameter 'k', rule '> 0 and'", ..., "k", {"rule": "> 0 and"}),
-    "equality": ("parameter 'k', rule '== 0'", ..., "k", {"rule": "== 0"}),
-    "infinite bound": ("parameter 'k', rule '> 1e999'", ..., "k", {"rule": "> 1e999"}),
-    "assumption": ("parameter 'k', rule '0 <'", ..., "k", {"rule": "> 0", "assumed": "0 <"}),
-    "number": ("parameter 'k'", ..., "k", {"rule": 0}),
-    "bound of an unknown name": ("", ..., "k", {"rule": "> q"}),
-    "bound of itself": ("", ..., "k", {"rule": "> k"}),
+    "word": ("k", {"rule": "positive"}),
+    "bound without a number": ("k", {"rule": "> "}),
+    "half a rule": ("k", {"rule": "> 0 and"}),
+    "equality": ("k", {"rule": "== 0"}),
+    "infinite bound": ("k", {"rule": "> 1e999"}),
+    "assumption": ("k", {"rule": "> 0", "assumed": "0 <"}),
+    "number": ("k", {"rule": 0}),
+    "bound of an unknown name": ("k", {"rule": "> q"}),
+    "bound of itself": ("k", {"rule": "> k"}),
 }
-group(
-    "rule of a parameter",
-    ChartError,
-    lambda name, given: one_state(Parameter(name, **given), "h"),
-    rows,
-)
+group("rule of a parameter", lambda name, given: one_state(Parameter(name, **given), "h"), rows)
 
-rows = {
-    "equation that is a table": (
-        "state 'slip', flow of 'z', column 1",
-        ...,
-        lambda: chart(state(flow={"z": {"v": 1}})),
-    ),
-}
-group("wrong kind", ExpressionError, lambda call: call(), rows)
+rows = {"equation that is a table": lambda: chart(state(flow={"z": {"v": 1}}))}
+group("wrong kind", called, rows)
 PUSHED, SWEPT = Prescribed(0.2), {"v_s": [1e-3, 2e-3]}
 rows = {
-    "rig before model": ("model", PUSHED, (PUSHED, stick_slip("signed"), 3.0, SWEPT)),
-    "values before rig": ("rig", SWEPT, (stick_slip("signed"), SWEPT, PUSHED, 3.0)),
-    "values for the end": ("t_end", SWEPT, (stick_slip("signed"), PUSHED, SWEPT, 3.0)),
-    "values without a name": (
-        "parameters",
-        [1.0],
-        (stick_slip("signed"), PUSHED, 3.0, [1.0]),
-    ),
+    "rig before model": ((PUSHED, stick_slip("signed"), 3.0, SWEPT),),
+    "values before rig": ((stick_slip("signed"), SWEPT, PUSHED, 3.0),),
+    "values for the end": ((stick_slip("signed"), PUSHED, SWEPT, 3.0),),
+    "values without a name": ((stick_slip("signed"), PUSHED, 3.0, [1.0]),),
 }
-group("sweep", ParameterError, lambda given: sweep(*given, engine="machines"), rows)
+group("sweep", lambda given: sweep(*given, engine="machines"), rows)
 
 
 # --------------------------------------------------------------------------- monitors
@@ -1871,31 +1514,25 @@ def monitored(monitors: Callable[[], Any]) -> None:
 
 
 rows = {
-    "typo": ("", ..., lambda: "pasivity"),
-    "twice": ("", ..., lambda: ["chattering", Chattering(5)]),
-    "condition twice": ("", ..., lambda: ["z <= s", "z <= s"]),
-    "number": ("", ..., lambda: [3]),
-    "contact of a model": ("", ..., lambda: "pad: passivity"),
-    "name alone": ("", ..., lambda: "z"),
-    "one time": ("times", 1, lambda: Chattering(times=1)),
-    "fraction of a time": ("times", 2.5, lambda: Chattering(times=2.5)),
-    "no time": ("within", 0.0, lambda: Chattering(within=0.0)),
-    "tolerance": ("tolerance", -1.0, lambda: Passivity(tolerance=-1.0)),
+    "typo": lambda: "pasivity",
+    "twice": lambda: ["chattering", Chattering(5)],
+    "condition twice": lambda: ["z <= s", "z <= s"],
+    "number": lambda: [3],
+    "contact of a model": lambda: "pad: passivity",
+    "name alone": lambda: "z",
+    "one time": lambda: Chattering(times=1),
+    "fraction of a time": lambda: Chattering(times=2.5),
+    "no time": lambda: Chattering(within=0.0),
+    "tolerance": lambda: Passivity(tolerance=-1.0),
+    "unknown name": lambda: "z <= q",
+    "half a text": lambda: "abs(z) <= 1.1*",
+    "unknown element": lambda: "state(9) == slip",
+    "unknown state": lambda: "state == slide",
+    "equality": lambda: "z == s",
 }
-group("monitors", ParameterError, monitored, rows)
-rows = {
-    "unknown name": ("invariant, column 6", ..., lambda: "z <= q"),
-    "half a text": ("invariant, column 15", ..., lambda: "abs(z) <= 1.1*"),
-    "unknown element": ("invariant, column 1", ..., lambda: "state(9) == slip"),
-    "unknown state": ("invariant, column 10", ..., lambda: "state == slide"),
-    "equality": ("invariant, column 6", ..., lambda: "z == s"),
-}
-group("monitors", ExpressionError, monitored, rows)
-rows = {
-    f"unit {text!r}": (f"invariant {text!r}", ..., lambda text=text: text)
-    for text in ("z < 3 mm/s", "F < 2 furlong")
-}
-group("monitors", UnitError, monitored, rows)
+group("monitors", monitored, rows)
+rows = {f"unit {text!r}": lambda text=text: text for text in ("z < 3 mm/s", "F < 2 furlong")}
+group("monitors", monitored, rows)
 
 
 # --------------------------------------------------------------------------- branches
@@ -1904,11 +1541,11 @@ def forked(given: dict[str, Any]) -> None:
 
 
 rows = {
-    "values in a list": ("values", [], {"values": []}),
-    "a number for a law": ("law", 7, {"law": 7}),
-    "a number for a name": ("name", 7, {"name": 7}),
+    "values in a list": {"values": []},
+    "a number for a law": {"law": 7},
+    "a number for a name": {"name": 7},
 }
-group("fork", ParameterError, forked, rows)
+group("fork", forked, rows)
 # --------------------------------------------------------------------------- runs
 GIVEN = stick_slip("signed")
 
@@ -1940,65 +1577,55 @@ wrong_initial: dict[str, tuple[Any, ...]] = {
     "states": ("stick", ["stick"] * 3, None, 4),
 }
 rows = {
-    f"{name} = {value!r}": (name, value, {name: value})
-    for name, several in wrong.items()
-    for value in several
+    f"{name} = {value!r}": {name: value} for name, several in wrong.items() for value in several
 }
 rows |= {
-    f"initial {name} = {value!r}": (f"initial['{name}']", value, {"initial": {name: value}})
+    f"initial {name} = {value!r}": {"initial": {name: value}}
     for name, several in wrong_initial.items()
     for value in several
 }
 rows |= {
-    "NaN among the times": ("t_eval[1] (element 2)", NAN, {"t_eval": [0.1, NAN]}),
-    "NaN among the z": ("initial['z'][2] (element 3)", NAN, {"initial": {"z": [0, 0, NAN, 0]}}),
+    "NaN among the times": {"t_eval": [0.1, NAN]},
+    "NaN among the z": {"initial": {"z": [0, 0, NAN, 0]}},
 }
-group("argument of simulate", ParameterError, running, rows)
+group("argument of simulate", running, rows)
 OWN, OTHERS = ElementMachines(GIVEN), ElementMachines(stick_slip("published"))
 rows = {
-    "no time at all": ({"t_end": 0.0},),
-    "end before the start": ({"t_start": 1.0},),
-    "no step": ({"method": "rk4"},),
-    "no step for ticks": ({"events": "held"},),
-    "no step for events by step": ({"events": "step"},),
-    "no rows": ({"t_eval": []},),
-    "row behind the end": ({"t_eval": [0.0, 2.0]},),
-    "row before the start": ({"t_eval": [-0.5, 0.5]},),
-    "rows out of order": ({"t_eval": [0.1, 0.5, 0.2]},),
-    "row twice": ({"t_eval": [0.1, 0.5, 0.5]},),
-    "rows in rows": ({"t_eval": [[0.1, 0.2]]},),
-    "t_eval without times": ({"output": "t_eval"},),
-    "the end, and times": ({"output": "end", "t_eval": [0.5]},),
-    "all, and times": ({"output": "all", "t_eval": [0.5]},),
-    "unknown initial value": ({"initial": {"q": [1]}},),
-    "too few z": ({"initial": {"z": [1.0]}},),
-    "z that is one number": ({"initial": {"z": 1.0}},),
-    "z with an axis more": ({"initial": {"z": [[0.0] * 4]}},),
-    "velocity that is prescribed": ({"initial": {"v": 1.0}},),
-    "unknown argument": ({"rtoll": 1e-3},),
-    "compiled, and a solver of SciPy": ({"engine": "compiled", "method": RK45},),
-    "checkpoint, and a solver of SciPy": ({"checkpoint": "a", "method": RK45},),
-    "machines that run nothing": ({"engine": "ifelse", "machines": OWN},),
-    "machines twice": ({"engine": OWN, "machines": OWN},),
-    "machines of another model": ({"machines": OTHERS},),
-    "machines of another model, compiled": ({"engine": "compiled", "machines": OTHERS},),
+    "no time at all": {"t_end": 0.0},
+    "end before the start": {"t_start": 1.0},
+    "no step": {"method": "rk4"},
+    "no step for ticks": {"events": "held"},
+    "no step for events by step": {"events": "step"},
+    "no rows": {"t_eval": []},
+    "row behind the end": {"t_eval": [0.0, 2.0]},
+    "row before the start": {"t_eval": [-0.5, 0.5]},
+    "rows out of order": {"t_eval": [0.1, 0.5, 0.2]},
+    "row twice": {"t_eval": [0.1, 0.5, 0.5]},
+    "rows in rows": {"t_eval": [[0.1, 0.2]]},
+    "t_eval without times": {"output": "t_eval"},
+    "the end, and times": {"output": "end", "t_eval": [0.5]},
+    "all, and times": {"output": "all", "t_eval": [0.5]},
+    "unknown initial value": {"initial": {"q": [1]}},
+    "too few z": {"initial": {"z": [1.0]}},
+    "z that is one number": {"initial": {"z": 1.0}},
+    "z with an axis more": {"initial": {"z": [[0.0] * 4]}},
+    "velocity that is prescribed": {"initial": {"v": 1.0}},
+    "unknown argument": {"rtoll": 1e-3},
+    "compiled, and a solver of SciPy": {"engine": "compiled", "method": RK45},
+    "checkpoint, and a solver of SciPy": {"checkpoint": "a", "method": RK45},
+    "machines that run nothing": {"engine": "ifelse", "machines": OWN},
+    "machines twice": {"engine": OWN, "machines": OWN},
+    "machines of another model": {"machines": OTHERS},
+    "machines of another model, compiled": {"engine": "compiled", "machines": OTHERS},
+    "end beyond the clock": {"t_end": 1e10},
+    "unknown state": {"initial": {"states": ["stick"] * 3 + ["glue"]}},
+    "state by number": {"initial": {"states": [0, 0, 0, 0]}},
 }
-group("arguments of simulate", ParameterError, running, rows, "")
-rows = {
-    "end beyond the clock": ("t_end", 10000000000.0, {"t_end": 1e10}),
-}
-group("arguments of simulate", ParameterError, running, rows)
-rows = {
-    "unknown state": ({"initial": {"states": ["stick"] * 3 + ["glue"]}},),
-    "state by number": ({"initial": {"states": [0, 0, 0, 0]}},),
-}
-group("arguments of simulate", ChartError, running, rows, "")
+group("arguments of simulate", running, rows)
 group(
     "arguments of simulate",
-    OutputError,
     running,
-    {"checkpoint in no folder": ({"checkpoint": "no/run.checkpoint"},)},
-    "",
+    {"checkpoint in no folder": {"checkpoint": "no/run.checkpoint"}},
 )
 PAIR = systems_cases.two_blocks()
 
@@ -2014,20 +1641,12 @@ def of_pad() -> ElementMachines:
 
 
 rows = {
-    "of an unknown contact": ("", ..., lambda: {"pad3": of_pad()}),
-    "of another contact": ("", ..., lambda: {"pad2": of_pad()}),
-    "that are a contact": (
-        "machines['pad1']",
-        PAIR.system.contact("pad1"),
-        lambda: {"pad1": PAIR.system.contact("pad1")},
-    ),
-    "of several contacts": (
-        "machines",
-        PAIR.system.contact("pad1"),
-        lambda: PAIR.system.contact("pad1"),
-    ),
+    "of an unknown contact": lambda: {"pad3": of_pad()},
+    "of another contact": lambda: {"pad2": of_pad()},
+    "that are a contact": lambda: {"pad1": PAIR.system.contact("pad1")},
+    "of several contacts": lambda: PAIR.system.contact("pad1"),
 }
-group("machines of a system", ParameterError, on_pads, rows)
+group("machines of a system", on_pads, rows)
 
 
 @dataclasses.dataclass
@@ -2052,36 +1671,24 @@ ALL_EARS = dataclasses.replace(
 EARS = System("ears", supervisors=(Supervisor("mode", ALL_EARS, inputs={"P": 1.0}),))
 KICKED = Chart("kick", states=(State("on", entry={"v": "1"}, outputs={"F": "0"}),))
 rows = {
-    "text for a model": ("model", "GMS", lambda: simulate("GMS", Prescribed("0"), 1.0)),
-    "class for a model": ("model", GMS, lambda: simulate(GMS, Prescribed("0"), 1.0)),
-    "rig before model": ("model", STILL, lambda: simulate(STILL, GIVEN, 1.0)),  # type: ignore[arg-type]
-    "supervisor as a contact": ("contact 'm'", ..., lambda: Contact("m", SEEN, {"mu": 0.4})),
-    "input of a supervisor": (
-        "supervisor 'mode'",
-        ...,
-        lambda: System("room", supervisors=(Supervisor("mode", SEEN),)),
-    ),
-    "value of a system": ("", ..., lambda: simulate(ROOM, 1.0).value("mode.Y")),
-    "class for a rig": ("rig", Slider, lambda: simulate(GIVEN, Slider, 1.0)),
-    "class for a model of a contact": ("contact 'pad': chart", GMS, lambda: Contact("pad", GMS)),
-    "end under another name": ("", ..., lambda: simulate(GIVEN, Prescribed("0"), tend=1.0)),  # type: ignore[call-arg]
-    "too many jumps": (
-        "floor(t / 1e-07)",
-        ...,
-        lambda: simulate(GIVEN, Prescribed("mod(t, 1e-7)"), 1.0),
-    ),
-    "too many events": ("system 'ears'", ..., lambda: simulate(EARS, 1.0)),
-    "text for a rig": ("rig", "0.1*t", lambda: simulate(GIVEN, "0.1*t", 1.0)),
-    "argument of a session": ("", ..., lambda: Session(GIVEN, Prescribed("0"), 1.0, steps=3)),
-    "elements of no class": ("element", dict, lambda: ElementMachines(GIVEN, dict)),
-    "elements that are equal": ("", ..., lambda: ElementMachines(GIVEN, Equal)),
-    "entry that sets the velocity": (
-        "chart 'kick'",
-        ...,
-        lambda: simulate(ChartModel(KICKED, {}), Slider(1.0, "1"), 1.0),
-    ),
+    "text for a model": lambda: simulate("GMS", Prescribed("0"), 1.0),
+    "class for a model": lambda: simulate(GMS, Prescribed("0"), 1.0),
+    "rig before model": lambda: simulate(STILL, GIVEN, 1.0),  # type: ignore[arg-type]
+    "supervisor as a contact": lambda: Contact("m", SEEN, {"mu": 0.4}),
+    "input of a supervisor": lambda: System("room", supervisors=(Supervisor("mode", SEEN),)),
+    "value of a system": lambda: simulate(ROOM, 1.0).value("mode.Y"),
+    "class for a rig": lambda: simulate(GIVEN, Slider, 1.0),
+    "class for a model of a contact": lambda: Contact("pad", GMS),
+    "end under another name": lambda: simulate(GIVEN, Prescribed("0"), tend=1.0),  # type: ignore[call-arg]
+    "too many jumps": lambda: simulate(GIVEN, Prescribed("mod(t, 1e-7)"), 1.0),
+    "too many events": lambda: simulate(EARS, 1.0),
+    "text for a rig": lambda: simulate(GIVEN, "0.1*t", 1.0),
+    "argument of a session": lambda: Session(GIVEN, Prescribed("0"), 1.0, steps=3),
+    "elements of no class": lambda: ElementMachines(GIVEN, dict),
+    "elements that are equal": lambda: ElementMachines(GIVEN, Equal),
+    "entry that sets the velocity": lambda: simulate(ChartModel(KICKED, {}), Slider(1.0, "1"), 1.0),
 }
-group("run", ParameterError, lambda make: make(), rows)
+group("run", called, rows)
 
 
 def showing(words: str) -> None:
@@ -2091,19 +1698,18 @@ def showing(words: str) -> None:
 
 
 rows = {
-    "plot": ("plot run.npz",),
-    "film": ("animate run.npz",),
-    "replay of one contact": ("replay run.npz --contact mode",),
+    "plot": "plot run.npz",
+    "film": "animate run.npz",
+    "replay of one contact": "replay run.npz --contact mode",
 }
-group("supervisors alone", ParameterError, showing, rows, "run.npz")
+group("supervisors alone", showing, rows)
 rows = {
-    "end without rows": ("until", ..., {"until": "v > 1", "output": "end"}),
-    "times of no events": ("timetable", ..., {"events": {}}),
-    "time of an event": ("times['oil'][1] (element 2)", NAN, {"events": {"oil": [0.0, NAN]}}),
+    "end without rows": {"until": "v > 1", "output": "end"},
+    "times of no events": {"events": {}},
+    "time of an event": {"events": {"oil": [0.0, NAN]}},
 }
 rows |= {
-    f"end at {text}": ("until, column 1", ..., {"until": text})
-    for text in ("z1 > 0.1", "F", "count(friction.slid) > 1", "")
+    f"end at {text}": {"until": text} for text in ("z1 > 0.1", "F", "count(friction.slid) > 1", "")
 }
 
 
@@ -2114,11 +1720,7 @@ def ended(events: Any = None, **how: Any) -> None:
     simulate(GIVEN, STILL, 1.0, **how)
 
 
-for name, row in rows.items():
-    error = {"until": ParameterError, "timetable": ChartError}.get(
-        row[0], ExpressionError if name.startswith("end at") else ParameterError
-    )
-    group("run", error, lambda given: ended(**given), {name: row})
+group("run", lambda given: ended(**given), rows)
 
 
 # --------------------------------------------------------------------------- derivatives
@@ -2131,65 +1733,47 @@ def derived(names: Any, of: str = "v", to: str = "F_s", rig: Any = None, **how: 
 
 _TOUCH = {"events": "step", "max_step": 0.01}
 rows = {
-    "by what is unknown": ("", ..., lambda: derived(["F_x"])),
-    "by an initial value that is unknown": ("sensitivities", ..., lambda: derived(["initial.w"])),
-    "by one number twice": (
-        "sensitivities",
-        ("F_s", "F_s"),
-        lambda: derived(["F_s", "F_s"]),
-    ),
-    "by what stands in the text": ("sensitivities", "delta", lambda: derived(["delta"])),
-    "of what is unknown": ("of", ..., lambda: derived(["F_s"], "w")),
-    "by another one": ("to", ..., lambda: derived(["F_s"], to="k1")),
-    "without any": ("sensitivity", ..., lambda: derived([])),
-    "of switches not located": ("events", "step", lambda: derived(["F_s"], **_TOUCH)),
-    "until": ("until", "v > 1", lambda: derived(["F_s"], until="v > 1")),
-    "of a Python function": (
-        "signal 'v'",
-        ...,
-        lambda: derived(["F_s"], rig=Prescribed(lambda t: 0.1 * t)),
-    ),
+    "by what is unknown": lambda: derived(["F_x"]),
+    "by an initial value that is unknown": lambda: derived(["initial.w"]),
+    "by one number twice": lambda: derived(["F_s", "F_s"]),
+    "by what stands in the text": lambda: derived(["delta"]),
+    "of what is unknown": lambda: derived(["F_s"], "w"),
+    "by another one": lambda: derived(["F_s"], to="k1"),
+    "without any": lambda: derived([]),
+    "of switches not located": lambda: derived(["F_s"], **_TOUCH),
+    "until": lambda: derived(["F_s"], until="v > 1"),
+    "of a Python function": lambda: derived(["F_s"], rig=Prescribed(lambda t: 0.1 * t)),
     "at other rows": (
-        "sensitivity",
-        ...,
         lambda: (
             simulate(*pulled_mass(), 0.1, sensitivities=["F_s"])
             .sample([0.05])
             .sensitivity("v", "F_s")
-        ),
+        )
     ),
-    "cycle from nowhere": ("near", ..., lambda: limit_cycle(*pulled_mass())),
-    "cycle near no trace": ("near", 3.0, lambda: limit_cycle(*pulled_mass(), near=3.0)),
-    "cycle without a return": (
-        "near",
-        ...,
-        lambda: limit_cycle(*pulled_mass(), near=simulate(*pulled_mass(), 0.1)),
+    "cycle from nowhere": lambda: limit_cycle(*pulled_mass()),
+    "cycle near no trace": lambda: limit_cycle(*pulled_mass(), near=3.0),
+    "cycle without a return": lambda: limit_cycle(
+        *pulled_mass(), near=simulate(*pulled_mass(), 0.1)
     ),
-    "cycle through a section not crossed": (
-        "section",
-        "v < -1",
-        lambda: limit_cycle(*pulled_mass(), near=simulate(*pulled_mass(), 9.0), section="v < -1"),
+    "cycle through a section not crossed": lambda: limit_cycle(
+        *pulled_mass(), near=simulate(*pulled_mass(), 9.0), section="v < -1"
     ),
     "cycle of what is sampled": (
-        "period",
-        0.0015,
         lambda: limit_cycle(
             *load_scenario("servo", []).subject[:1],
             near=simulate(*load_scenario("servo", []).subject[:1], 0.01),
             period=0.0015,
-        ),
+        )
     ),
     "cycle of what is driven": (
-        "period",
-        ...,
         lambda: limit_cycle(
             pulled_mass()[0],
             Slider(1.0, "sin(t)"),
             near=simulate(pulled_mass()[0], Slider(1.0, "sin(t)"), 0.5),
-        ),
+        )
     ),
 }
-group("derivatives", ParameterError, lambda make: make(), rows)
+group("derivatives", called, rows)
 
 
 # --------------------------------------------------------------------------- sweeps
@@ -2199,44 +1783,38 @@ def sweeping(parameters: Any, **options: Any) -> None:
 
 
 rows = {
-    "unknown": ({"q": [1, 2]},),
-    "number of another rig": ({"F_a": [1, 2]},),
-    "no parameters": ({},),
-    "no runs": ({"F_s": []},),
-    "no runs, wide": ({"k": np.empty((0, 4))},),
-    "different lengths": ({"F_s": [1, 2], "k": np.ones((3, 4))},),
-    "too many elements": ({"k": np.ones((2, 5))},),
-    "too deep": ({"k": np.ones((2, 4, 1))},),
-    "wide where one is meant": ({"v_c": np.ones((2, 4))},),
-    "words": ({"F_s": ["much", "more"]},),
-    "ragged": ({"k": [[1, 2], [1]]},),
-    "nothing": ({"F_s": None},),
-    "initial value for other elements": ({"initial.z": np.ones((2, 3))},),
-    "initial value of one element, wide": ({"initial.z2": np.ones((2, 4))},),
+    "unknown": {"q": [1, 2]},
+    "number of another rig": {"F_a": [1, 2]},
+    "no parameters": {},
+    "no runs": {"F_s": []},
+    "no runs, wide": {"k": np.empty((0, 4))},
+    "different lengths": {"F_s": [1, 2], "k": np.ones((3, 4))},
+    "too many elements": {"k": np.ones((2, 5))},
+    "too deep": {"k": np.ones((2, 4, 1))},
+    "wide where one is meant": {"v_c": np.ones((2, 4))},
+    "words": {"F_s": ["much", "more"]},
+    "ragged": {"k": [[1, 2], [1]]},
+    "nothing": {"F_s": None},
+    "initial value for other elements": {"initial.z": np.ones((2, 3))},
+    "initial value of one element, wide": {"initial.z2": np.ones((2, 4))},
+    "unknown initial value": {"initial.q": [1.0]},
+    "period of what does not tick": {"friction.period": [1.0]},
+    "signal of another rig": {"F_a": ["t"]},
+    "one number": {"F_s": 1.5},
+    "one number, wide": {"k": 1.5},
 }
-group("parameters of a sweep", ParameterError, sweeping, rows, "")
+group("parameters of a sweep", sweeping, rows)
 rows = {
-    "unknown initial value": ("parameters", ..., {"initial.q": [1.0]}),
-    "period of what does not tick": ("parameters", ..., {"friction.period": [1.0]}),
-    "signal of another rig": ("parameters", ..., {"F_a": ["t"]}),
+    "all rows": {"output": "all"},
+    "times that are missing": {"output": "t_eval"},
+    "typo": {"t_evil": [0.5]},
+    "parameter that varies": {"F_s": [1.5, 2.0]},
+    "unknown engine": {"engine": "turbo"},
+    "negative tolerance": {"rtol": -1},
+    "unknown initial value": {"initial": {"q": 1}},
+    "what varies, as in play": {"vary": {"F_s": (0.5, 3.0)}},
 }
-group("parameters of a sweep", ParameterError, sweeping, rows)
-rows = {
-    "one number": ("parameters['F_s']", 1.5, {"F_s": 1.5}),
-    "one number, wide": ("parameters['k']", 1.5, {"k": 1.5}),
-}
-group("parameters of a sweep", ParameterError, sweeping, rows)
-rows = {
-    "all rows": ("", ..., {"output": "all"}),
-    "times that are missing": ("", ..., {"output": "t_eval"}),
-    "typo": ("", ..., {"t_evil": [0.5]}),
-    "parameter that varies": ("", ..., {"F_s": [1.5, 2.0]}),
-    "unknown engine": ("engine", "turbo", {"engine": "turbo"}),
-    "negative tolerance": ("rtol", -1.0, {"rtol": -1}),
-    "unknown initial value": ("", ..., {"initial": {"q": 1}}),
-    "what varies, as in play": ("", ..., {"vary": {"F_s": (0.5, 3.0)}}),
-}
-group("option of a sweep", ParameterError, lambda how: sweeping({"F_s": [1.5]}, **how), rows)
+group("option of a sweep", lambda how: sweeping({"F_s": [1.5]}, **how), rows)
 
 
 def sweeping_system(*given: Any) -> None:
@@ -2245,12 +1823,12 @@ def sweeping_system(*given: Any) -> None:
 
 
 rows = {
-    "unknown": ("", ..., 1.0, {"m": [1.0]}),
-    "wide": ("", ..., 1.0, {"pad1.F_s": [[1.5, 1.6]]}),
-    "no names": ("parameters", [1.0], 1.0, [1.0]),
-    "rig": ("rig", 9.0, 9.0, 1.0, {"pad1.F_s": [1.0]}),
+    "unknown": (1.0, {"m": [1.0]}),
+    "wide": (1.0, {"pad1.F_s": [[1.5, 1.6]]}),
+    "no names": (1.0, [1.0]),
+    "rig": (9.0, 1.0, {"pad1.F_s": [1.0]}),
 }
-group("parameters of a sweep of a system", ParameterError, sweeping_system, rows)
+group("parameters of a sweep of a system", sweeping_system, rows)
 
 
 # --------------------------------------------------------------------------- stepping
@@ -2274,43 +1852,35 @@ def unchanged(friction: Any, call: Callable[[Any], object]) -> None:
 
 BRISTLE = lugre()
 rows = {
-    "NaN": ("v0", NAN, lambda f: f.advance(NAN, 0.1, 0.1)),
-    "infinity": ("v1", INF, lambda f: f.peek(0.1, INF, 0.1)),
-    "word": ("v0", "fast", lambda f: f.advance("fast", 0.1, 0.1)),
-    "nothing": ("v0", None, lambda f: f.advance(None, 0.1, 0.1)),
-    "list": ("v1", [0.1, 0.2], lambda f: f.advance(0.1, [0.1, 0.2], 0.1)),
-    "back in time": ("dt", -1e-3, lambda f: f.advance(0.1, 0.1, -1e-3)),
-    "NaN seconds": ("dt", NAN, lambda f: f.peek(0.1, 0.1, NAN)),
-    "long time": ("t", 10000000002.1, lambda f: f.advance(0.1, 0.1, 1e10)),
-    "earlier time": ("t", 1.0, lambda f: f.advance_to(0.1, 0.1, 1.0)),
-    "input": ("", ..., lambda f: f.advance(0.1, 0.1, 0.1, N=(1.0, 1.0))),
-    "event": ("", ..., lambda f: f.send("oil")),
-    "snapshot of another model": (
-        "snapshot",
-        ...,
-        lambda f: f.restore(FrictionState(BRISTLE).snapshot()),
-    ),
-    "snapshot of a bank": ("snapshot", ..., lambda f: f.restore(FrictionBank([GIVEN]).snapshot())),
-    "no snapshot": ("snapshot", [1.0], lambda f: f.restore([1.0])),
-    "short array": ("array", ..., lambda f: f.from_array(f.to_array()[:-1])),
-    "array of NaN": ("array[0] (element 1)", NAN, lambda f: f.from_array(NAN * f.to_array())),
-    "array that was changed": ("array", ..., lambda f: f.from_array(f.to_array() + 0.5)),
+    "NaN": lambda f: f.advance(NAN, 0.1, 0.1),
+    "infinity": lambda f: f.peek(0.1, INF, 0.1),
+    "word": lambda f: f.advance("fast", 0.1, 0.1),
+    "nothing": lambda f: f.advance(None, 0.1, 0.1),
+    "list": lambda f: f.advance(0.1, [0.1, 0.2], 0.1),
+    "back in time": lambda f: f.advance(0.1, 0.1, -1e-3),
+    "NaN seconds": lambda f: f.peek(0.1, 0.1, NAN),
+    "long time": lambda f: f.advance(0.1, 0.1, 1e10),
+    "earlier time": lambda f: f.advance_to(0.1, 0.1, 1.0),
+    "input": lambda f: f.advance(0.1, 0.1, 0.1, N=(1.0, 1.0)),
+    "event": lambda f: f.send("oil"),
+    "snapshot of another model": lambda f: f.restore(FrictionState(BRISTLE).snapshot()),
+    "snapshot of a bank": lambda f: f.restore(FrictionBank([GIVEN]).snapshot()),
+    "no snapshot": lambda f: f.restore([1.0]),
+    "short array": lambda f: f.from_array(f.to_array()[:-1]),
+    "array of NaN": lambda f: f.from_array(NAN * f.to_array()),
+    "array that was changed": lambda f: f.from_array(f.to_array() + 0.5),
 }
-group("step", ParameterError, lambda call: unchanged(started(GIVEN), call), rows)
+group("step", lambda call: unchanged(started(GIVEN), call), rows)
 rows = {
-    "one number": ("", ..., lambda b: b.advance(0.1, [0.1, 0.1], 0.1)),
-    "three numbers": ("v1", ..., lambda b: b.advance([0.1] * 2, [0.1] * 3, 0.1)),
-    "NaN": ("v0[1] (element 2)", NAN, lambda b: b.advance([0.1, NAN], [0.1] * 2, 0.1)),
-    "back in time": ("dt", -1.0, lambda b: b.peek([0.1] * 2, [0.1] * 2, -1.0)),
-    "snapshot of three": (
-        "snapshot",
-        ...,
-        lambda b: b.restore(FrictionBank([GIVEN] * 3).snapshot()),
-    ),
-    "short array": ("array", ..., lambda b: b.from_array(b.to_array()[:-2])),
-    "half an array": ("array", ..., lambda b: b.from_array([*b.to_array()[:-5], *[0.5] * 5])),
+    "one number": lambda b: b.advance(0.1, [0.1, 0.1], 0.1),
+    "three numbers": lambda b: b.advance([0.1] * 2, [0.1] * 3, 0.1),
+    "NaN": lambda b: b.advance([0.1, NAN], [0.1] * 2, 0.1),
+    "back in time": lambda b: b.peek([0.1] * 2, [0.1] * 2, -1.0),
+    "snapshot of three": lambda b: b.restore(FrictionBank([GIVEN] * 3).snapshot()),
+    "short array": lambda b: b.from_array(b.to_array()[:-2]),
+    "half an array": lambda b: b.from_array([*b.to_array()[:-5], *[0.5] * 5]),
 }
-group("step of a bank", ParameterError, lambda call: unchanged(started(GIVEN, BRISTLE), call), rows)
+group("step of a bank", lambda call: unchanged(started(GIVEN, BRISTLE), call), rows)
 PUSHED = Chart("loaded", inputs=("v", "N"), states=(State("only", outputs={"F": "N * v"}),))
 READS_A = Chart(
     "feels",
@@ -2347,88 +1917,76 @@ SAMPLED_PAD = System(
     "ticking", bodies=(Body("mass", inertia=1.0),), contacts=(Contact("pad", GIVEN, period=0.1),)
 )
 rows = {
-    "number": ("trace", 3, lambda: linearize(3, 1.0)),
-    "time after the run": ("t", 2.5, lambda: linearize(ran(), 2.5)),
-    "unknown input": ("inputs", ..., lambda: linearize(ran(), 1.0, inputs="u")),
-    "input that is no name": ("inputs", 3, lambda: linearize(ran(), 1.0, inputs=3)),
-    "contact with a period": (
-        "contact 'pad'", ..., lambda: linearize(simulate(SAMPLED_PAD, 1.0), 0.5)),
-    "amplitude": ("amplitude", 0.0, lambda: describing_function(GIVEN, [1.0, 0.0], 1.0)),
-    "frequency": ("omega", -1.0, lambda: describing_function(GIVEN, 1.0, -1.0)),
-    "friction with an input": ("input", "v", lambda: describing_function(GIVEN, 1, 1, input="v")),
-    "friction that locks": (
-        "chart 'Coulomb friction with stiction'", ...,
-        lambda: describing_function(placed("stiction"), 1, 1)),
-    "system without an input": ("input", ..., lambda: describing_function(SAMPLED_PAD, 1, 1)),
-    "input that the system has not": (
-        "", ..., lambda: describing_function(SAMPLED_PAD, 1, 1, input="u", output="x")),
-}  # fmt: skip
-group("linear answer", ParameterError, called, rows)
+    "number": lambda: linearize(3, 1.0),
+    "time after the run": lambda: linearize(ran(), 2.5),
+    "unknown input": lambda: linearize(ran(), 1.0, inputs="u"),
+    "input that is no name": lambda: linearize(ran(), 1.0, inputs=3),
+    "contact with a period": lambda: linearize(simulate(SAMPLED_PAD, 1.0), 0.5),
+    "amplitude": lambda: describing_function(GIVEN, [1.0, 0.0], 1.0),
+    "frequency": lambda: describing_function(GIVEN, 1.0, -1.0),
+    "friction with an input": lambda: describing_function(GIVEN, 1, 1, input="v"),
+    "friction that locks": lambda: describing_function(placed("stiction"), 1, 1),
+    "system without an input": lambda: describing_function(SAMPLED_PAD, 1, 1),
+    "input that the system has not": lambda: describing_function(
+        SAMPLED_PAD, 1, 1, input="u", output="x"
+    ),
+}
+group("linear answer", called, rows)
 rows = {
-    "number": ("model_or_contact", 3, lambda: Compensator(3, 1e-3)),
-    "period": ("period", 0.0, lambda: Compensator(GIVEN, 0.0)),
-    "feedback": ("feedback", 1.5, lambda: Compensator(GIVEN, 1e-3, feedback=1.5)),
-    "limit": ("limit", -1.0, lambda: Compensator(GIVEN, 1e-3, limit=-1.0)),
-    "gain": ("gain", "all", lambda: Compensator(GIVEN, 1e-3, gain="all")),
-    "missing velocity": ("measured", ..., lambda: Compensator(GIVEN, 1, feedback=1.0).advance(0.1)),
-    "velocity that is NaN": ("reference", NAN, lambda: Compensator(GIVEN, 1).advance(NAN)),
-    "velocity that is a word": ("reference", "fast", lambda: Compensator(GIVEN, 1).advance("fast")),
-    "measured word": (
-        "measured", "x", lambda: Compensator(GIVEN, 1, feedback=0.5).advance(0.1, "x")),
-    "friction that locks": (
-        "chart 'Coulomb friction with stiction'", ..., lambda: Compensator(placed("stiction"), 1)),
-    "format that cannot": (
-        "system", ..., lambda: export(Compensator(GIVEN, 1), "js", "out", name="pad")),
-}  # fmt: skip
-group("compensator", ParameterError, called, rows)
+    "number": lambda: Compensator(3, 1e-3),
+    "period": lambda: Compensator(GIVEN, 0.0),
+    "feedback": lambda: Compensator(GIVEN, 1e-3, feedback=1.5),
+    "limit": lambda: Compensator(GIVEN, 1e-3, limit=-1.0),
+    "gain": lambda: Compensator(GIVEN, 1e-3, gain="all"),
+    "missing velocity": lambda: Compensator(GIVEN, 1, feedback=1.0).advance(0.1),
+    "velocity that is NaN": lambda: Compensator(GIVEN, 1).advance(NAN),
+    "velocity that is a word": lambda: Compensator(GIVEN, 1).advance("fast"),
+    "measured word": lambda: Compensator(GIVEN, 1, feedback=0.5).advance(0.1, "x"),
+    "friction that locks": lambda: Compensator(placed("stiction"), 1),
+    "format that cannot": lambda: export(Compensator(GIVEN, 1), "js", "out", name="pad"),
+}
+group("compensator", called, rows)
 locks = ("stiction", "karnopp", "modelica", "dog-clutch", "end-stop")
 rows = {
-    "number": ("model_or_contact", 3, lambda: FrictionState(3)),
-    "class": ("model_or_contact", GMS, lambda: FrictionState(GMS)),
-    "late start": ("t", 1e9, lambda: FrictionState(GIVEN, t=1e9)),
-    "length alone": ("v1", LACKING, lambda: FrictionState(GIVEN).advance(1e-3)),
-    "sample that the clock does not resolve": (
-        "dt", 1e-9, lambda: FrictionState(GIVEN, t=1e8).advance(0.1, 0.1, 1e-9)),
-    "input with the name of an argument": (
-        "contact 'pad'", ..., lambda: FrictionState(placed(PUSHED, inputs={"N": "2 * dt"}))),
-    "input that is not given": (
-        "", ..., lambda: pressed().advance(0.0, 0.1, 0.1)),
-    "input that is no pair": (
-        "N_0", 5.0, lambda: pressed().peek(0, 0, 0, N_0=5.0)),
-    "input that is NaN": (
-        "N_0", NAN,
-        lambda: pressed().peek(0, 0, 0, N_0=(1.0, NAN))),
-    "engine": ("engine", "machines", lambda: FrictionState(GIVEN, engine="machines")),
-    "tolerance": ("rtol", -1.0, lambda: FrictionState(GIVEN, rtol=-1.0)),
-    "initial velocity": ("", ..., lambda: FrictionState(GIVEN, initial={"v": 1.0})),
-    **{
-        f"lock of {name}": ("", ..., lambda name=name: FrictionState(placed(name)))
-        for name in locks
-    },
-    "two velocities": (
-        "", ..., lambda: FrictionState(placed("planar-coulomb", v=("v", "w"), inputs=PLANAR))),
-    "period": ("contact 'pad'", ..., lambda: FrictionState(Contact("pad", GIVEN, period=0.1))),
-    "mean before a sample": ("", ..., lambda: FrictionState(GIVEN).mean_force),
-    "slope before a sample": ("", ..., lambda: FrictionState(GIVEN).dF_dv),
-    "look beyond the clock": ("t", 1e15, lambda: FrictionState(GIVEN).peek(0.0, 0.1, 1e15)),
-    "joints at different times": ("array", ..., two_times),
-    "empty bank": ("models", ..., lambda: FrictionBank([])),
-    "joint": ("models[1]: model_or_contact", 3, lambda: FrictionBank([GIVEN, 3])),
-    "initial values of two": ("initial", ..., lambda: FrictionBank([GIVEN], initial=[{}, {}])),
-    "equations with a lock": ("", ..., lambda: FrictionEquations(placed("stiction"))),
-    "equations with two velocities": (
-        "", ..., lambda: FrictionEquations(placed("planar-coulomb", v=("v", "w"), inputs=PLANAR))),
-    "equations with a period": (
-        "contact 'pad'", ..., lambda: FrictionEquations(Contact("pad", GIVEN, period=1e-3))),
-    "equations that read the acceleration": (
-        "chart 'feels'", ..., lambda: FrictionEquations(ChartModel(READS_A, {}))),
-    "equations with an unknown input": (
-        "chart 'loaded'", ..., lambda: FrictionEquations(placed(PUSHED))),
-    "equations of a number": ("model_or_contact", 3, lambda: FrictionEquations(3)),
-    "equations before the first settle": (
-        "", ..., lambda: FrictionEquations(GIVEN).force(0.0, np.zeros(5), 0.0)),
-}  # fmt: skip
-group("stepping", ParameterError, lambda make: make(), rows)
+    "number": lambda: FrictionState(3),
+    "class": lambda: FrictionState(GMS),
+    "late start": lambda: FrictionState(GIVEN, t=1e9),
+    "length alone": lambda: FrictionState(GIVEN).advance(1e-3),
+    "sample that the clock does not resolve": lambda: FrictionState(GIVEN, t=1e8).advance(
+        0.1, 0.1, 1e-9
+    ),
+    "input with the name of an argument": lambda: FrictionState(
+        placed(PUSHED, inputs={"N": "2 * dt"})
+    ),
+    "input that is not given": lambda: pressed().advance(0.0, 0.1, 0.1),
+    "input that is no pair": lambda: pressed().peek(0, 0, 0, N_0=5.0),
+    "input that is NaN": lambda: pressed().peek(0, 0, 0, N_0=(1.0, NAN)),
+    "engine": lambda: FrictionState(GIVEN, engine="machines"),
+    "tolerance": lambda: FrictionState(GIVEN, rtol=-1.0),
+    "initial velocity": lambda: FrictionState(GIVEN, initial={"v": 1.0}),
+    **{f"lock of {name}": lambda name=name: FrictionState(placed(name)) for name in locks},
+    "two velocities": lambda: FrictionState(placed("planar-coulomb", v=("v", "w"), inputs=PLANAR)),
+    "period": lambda: FrictionState(Contact("pad", GIVEN, period=0.1)),
+    "mean before a sample": lambda: FrictionState(GIVEN).mean_force,
+    "slope before a sample": lambda: FrictionState(GIVEN).dF_dv,
+    "look beyond the clock": lambda: FrictionState(GIVEN).peek(0.0, 0.1, 1e15),
+    "joints at different times": (two_times,),
+    "empty bank": lambda: FrictionBank([]),
+    "joint": lambda: FrictionBank([GIVEN, 3]),
+    "initial values of two": lambda: FrictionBank([GIVEN], initial=[{}, {}]),
+    "equations with a lock": lambda: FrictionEquations(placed("stiction")),
+    "equations with two velocities": lambda: FrictionEquations(
+        placed("planar-coulomb", v=("v", "w"), inputs=PLANAR)
+    ),
+    "equations with a period": lambda: FrictionEquations(Contact("pad", GIVEN, period=1e-3)),
+    "equations that read the acceleration": lambda: FrictionEquations(ChartModel(READS_A, {})),
+    "equations with an unknown input": lambda: FrictionEquations(placed(PUSHED)),
+    "equations of a number": lambda: FrictionEquations(3),
+    "equations before the first settle": lambda: FrictionEquations(GIVEN).force(
+        0.0, np.zeros(5), 0.0
+    ),
+}
+group("stepping", called, rows)
 
 
 def steps() -> SystemState:
@@ -2456,44 +2014,37 @@ OPEN = System(
     inputs=("u",),
 )
 rows = {
-    "no input": ("system 'open'", ..., lambda s: s.advance(0.1)),
-    "another input": ("system 'open'", ..., lambda s: s.advance(0.1, w=1.0)),
-    "input too many": ("system 'open'", ..., lambda s: s.advance(0.1, u=1.0, w=1.0)),
-    "NaN": ("u", NAN, lambda s: s.advance(0.1, u=NAN)),
-    "infinite end": ("u", INF, lambda s: s.peek(0.1, u=(0.0, INF))),
-    "three values": ("u", [1.0, 2.0, 3.0], lambda s: s.advance(0.1, u=[1.0, 2.0, 3.0])),
-    "word": ("u", "fast", lambda s: s.advance(0.1, u="fast")),
-    "back in time": ("dt", -1.0, lambda s: s.advance(-1.0, u=1.0)),
-    "earlier time": ("t", 0.1, lambda s: s.advance_to(0.1, u=1.0)),
-    "time beyond the clock": ("t", 1e10, lambda s: s.advance_to(1e10, u=1.0)),
-    "name": ("", ..., lambda s: s.value("pad.z9")),
-    "name of a look ahead": ("", ..., lambda s: s.peek(0.1, "y", u=1.0)),
-    "event": ("", ..., lambda s: s.send("oil")),
-    "snapshot of a friction": (
-        "snapshot",
-        ...,
-        lambda s: s.restore(FrictionState(GIVEN).snapshot()),
-    ),
-}  # fmt: skip
-group("step of a system", ParameterError, same_after, rows)
+    "no input": lambda s: s.advance(0.1),
+    "another input": lambda s: s.advance(0.1, w=1.0),
+    "input too many": lambda s: s.advance(0.1, u=1.0, w=1.0),
+    "NaN": lambda s: s.advance(0.1, u=NAN),
+    "infinite end": lambda s: s.peek(0.1, u=(0.0, INF)),
+    "three values": lambda s: s.advance(0.1, u=[1.0, 2.0, 3.0]),
+    "word": lambda s: s.advance(0.1, u="fast"),
+    "back in time": lambda s: s.advance(-1.0, u=1.0),
+    "earlier time": lambda s: s.advance_to(0.1, u=1.0),
+    "time beyond the clock": lambda s: s.advance_to(1e10, u=1.0),
+    "name": lambda s: s.value("pad.z9"),
+    "name of a look ahead": lambda s: s.peek(0.1, "y", u=1.0),
+    "event": lambda s: s.send("oil"),
+    "snapshot of a friction": lambda s: s.restore(FrictionState(GIVEN).snapshot()),
+}
+group("step of a system", same_after, rows)
 opened = partial(dataclasses.replace, OPEN)
 rows = {
-    "model": ("system", GIVEN, lambda: SystemState(GIVEN)),
-    "function": (
-        "signal 'f'", ..., lambda: SystemState(opened(signals={"f": abs}), engine="compiled")),
-    "record": (
-        "signal 'f'", ..., lambda: SystemState(opened(signals={"f": ([0, 1], [0, 1])}))),
-    "no location": ("settings", ..., lambda: SystemState(OPEN, events="step", max_step=0.1)),
-    "open run": ("system 'open'", ..., lambda: simulate(OPEN, 1.0)),
-    "open session": ("system 'open'", ..., lambda: Session(OPEN, 1.0)),
-    "unknown input": ("inputs", ..., lambda: simulate(OPEN, 1.0, inputs={"w": 1.0})),
-    "no mapping": ("inputs", "1", lambda: simulate(OPEN, 1.0, inputs="1")),
-    "inputs of a model": (
-        "inputs", {"u": 1.0}, lambda: simulate(GIVEN, STILL, 1.0, inputs={"u": 1.0})),
-    "input used twice": ("system 'open'", ..., lambda: opened(inputs=("u", "x"))),
-    "input with a bad name": ("system 'open', input", ..., lambda: opened(inputs=("2u",))),
-}  # fmt: skip
-group("inputs of a system", ParameterError, lambda make: make(), rows)
+    "model": lambda: SystemState(GIVEN),
+    "function": lambda: SystemState(opened(signals={"f": abs}), engine="compiled"),
+    "record": lambda: SystemState(opened(signals={"f": ([0, 1], [0, 1])})),
+    "no location": lambda: SystemState(OPEN, events="step", max_step=0.1),
+    "open run": lambda: simulate(OPEN, 1.0),
+    "open session": lambda: Session(OPEN, 1.0),
+    "unknown input": lambda: simulate(OPEN, 1.0, inputs={"w": 1.0}),
+    "no mapping": lambda: simulate(OPEN, 1.0, inputs="1"),
+    "inputs of a model": lambda: simulate(GIVEN, STILL, 1.0, inputs={"u": 1.0}),
+    "input used twice": lambda: opened(inputs=("u", "x")),
+    "input with a bad name": lambda: opened(inputs=("2u",)),
+}
+group("inputs of a system", called, rows)
 AT_TICKS = {"period": 0.1, "outputs": ("u",)}
 
 
@@ -2503,24 +2054,18 @@ def by_function(function: Any) -> System:
 
 
 rows = {
-    "stepped": ("sampled 'pd'", ..., lambda: SystemState(by_function(lambda x: x))),
-    "outputs without names": (
-        "sampled 'pd': outputs", ..., lambda: Sampled("pd", period=0.1, updates=abs)),
-    "names for texts": (
-        "sampled 'pd': outputs", ..., lambda: Sampled("pd", updates={"u": "1"}, **AT_TICKS)),
-    "unknown value": ("sampled 'pd'", ..., lambda: simulate(by_function(lambda y: y), 1.0)),
-    "any values": ("sampled 'pd'", ..., lambda: simulate(by_function(lambda **all: 1.0), 1.0)),
-}  # fmt: skip
-group("controllers in Python", ParameterError, lambda make: make(), rows)
-rows = {
-    "it raises": ("sampled 'pd'", ..., lambda: simulate(by_function(lambda t: 1 / t), 1.0)),
-    "it returns a text": (
-        "sampled 'pd'",
-        ...,
-        lambda: simulate(by_function(lambda t: "fast"), 1.0),
-    ),
+    "stepped": lambda: SystemState(by_function(lambda x: x)),
+    "outputs without names": lambda: Sampled("pd", period=0.1, updates=abs),
+    "names for texts": lambda: Sampled("pd", updates={"u": "1"}, **AT_TICKS),
+    "unknown value": lambda: simulate(by_function(lambda y: y), 1.0),
+    "any values": lambda: simulate(by_function(lambda **all: 1.0), 1.0),
 }
-group("a call of a controller", SignalError, lambda make: make(), rows)
+group("controllers in Python", called, rows)
+rows = {
+    "it raises": lambda: simulate(by_function(lambda t: 1 / t), 1.0),
+    "it returns a text": lambda: simulate(by_function(lambda t: "fast"), 1.0),
+}
+group("a call of a controller", called, rows)
 # --------------------------------------------------------------------------- sessions
 FIG4 = stick_slip("published"), Prescribed(FIG4_SINE)
 
@@ -2554,112 +2099,90 @@ def unmoved(move: Callable[[Session], object], made: Callable[[], Session] = fig
 
 
 rows = {
-    "break on an unknown kind": (lambda s: s.break_on("fired", "arrest"),),
-    "break on an unknown edge": (lambda s: s.break_on("fires", "arest"),),
-    "break on an edge that is no state": (lambda s: s.break_on("enter", "arrest"),),
-    "break on an element too many": (lambda s: s.break_on("fires", "arrest", 4),),
-    "break on an element below zero": (lambda s: s.break_on("fires", "arrest", -1),),
-    "break after no hit": (lambda s: s.break_on("fires", "arrest", None, "", 0),),
-    "break on a change of an element": (lambda s: s.break_on("changes", "v", 1),),
-    "poke of nothing": (lambda s: s.poke(),),
-    "poke of no element": (lambda s: s.poke({"z": {}}, state={}),),
-    "poke of an element too many": (lambda s: s.poke({"z": {4: 0.1}}),),
-    "poke of an unknown variable": (lambda s: s.poke({"w": {0: 0.1}}),),
-    "poke of a number as a name": (lambda s: s.poke({0: 0.1}),),
-    "poke of the state of an element below zero": (lambda s: s.poke(state={-1: "slip"}),),
-    "poke of a prescribed velocity": (lambda s: s.poke(v=0.1),),
-    "poke of a parameter": (lambda s: s.poke({"F_s": {0: 2.0}}),),
+    "break on an unknown kind": lambda s: s.break_on("fired", "arrest"),
+    "break on an unknown edge": lambda s: s.break_on("fires", "arest"),
+    "break on an edge that is no state": lambda s: s.break_on("enter", "arrest"),
+    "break on an element too many": lambda s: s.break_on("fires", "arrest", 4),
+    "break on an element below zero": lambda s: s.break_on("fires", "arrest", -1),
+    "break after no hit": lambda s: s.break_on("fires", "arrest", None, "", 0),
+    "break on a change of an element": lambda s: s.break_on("changes", "v", 1),
+    "poke of nothing": lambda s: s.poke(),
+    "poke of no element": lambda s: s.poke({"z": {}}, state={}),
+    "poke of an element too many": lambda s: s.poke({"z": {4: 0.1}}),
+    "poke of an unknown variable": lambda s: s.poke({"w": {0: 0.1}}),
+    "poke of a number as a name": lambda s: s.poke({0: 0.1}),
+    "poke of the state of an element below zero": lambda s: s.poke(state={-1: "slip"}),
+    "poke of a prescribed velocity": lambda s: s.poke(v=0.1),
+    "poke of a parameter": lambda s: s.poke({"F_s": {0: 2.0}}),
     "poke of how long a condition has held": (lambda s: s.poke({"duration": {0: 1.0}}), rubber),
     "poke of it in a system": (lambda s: s.poke({"pad.duration1": 1.0}), rubber_pads),
-    "branch below zero": (lambda s: s.switch(-1),),
-    "branch that is missing": (lambda s: s.switch(1),),
-    "comparison without a parent": (lambda s: s.compare(b=0),),
-    "why of an element too many": (lambda s: s.why(4),),
-    "why of an unknown edge": (lambda s: s.why(0, "arest"),),
-    "why of an edge that leaves another state": (lambda s: s.why(0, "arrest"),),
-    "time before the start": (lambda s: s.goto(-1.0),),
-    "time that is none": (lambda s: s.goto(NAN),),
-    "watch that divides by zero": (lambda s: s.watch("1 / x"),),
-    "watch of the root of a negative number": (lambda s: s.watch("sqrt(-1 - x)"),),
-    "tree without the original run": (lambda s: s.tree.delete(0),),
-    "tree of a missing branch": (lambda s: s.tree.trace(7),),
-    "tree poked before the start": (lambda s: s.tree.poke({"z": {0: 0.0}}, t=-1.0),),
-    "tree poked at the end": (lambda s: s.tree.poke({"z": {0: 0.0}}, t=100.0),),
+    "branch below zero": lambda s: s.switch(-1),
+    "branch that is missing": lambda s: s.switch(1),
+    "comparison without a parent": lambda s: s.compare(b=0),
+    "why of an element too many": lambda s: s.why(4),
+    "why of an unknown edge": lambda s: s.why(0, "arest"),
+    "why of an edge that leaves another state": lambda s: s.why(0, "arrest"),
+    "time before the start": lambda s: s.goto(-1.0),
+    "time that is none": lambda s: s.goto(NAN),
+    "watch that divides by zero": lambda s: s.watch("1 / x"),
+    "watch of the root of a negative number": lambda s: s.watch("sqrt(-1 - x)"),
+    "tree without the original run": lambda s: s.tree.delete(0),
+    "tree of a missing branch": lambda s: s.tree.trace(7),
+    "tree poked before the start": lambda s: s.tree.poke({"z": {0: 0.0}}, t=-1.0),
+    "tree poked at the end": lambda s: s.tree.poke({"z": {0: 0.0}}, t=100.0),
+    "poke of a variable by its name": lambda s: s.poke(z1=0.1),
+    "poke of all elements at once": lambda s: s.poke({"z": 0.1}),
+    "break on a change of a number": lambda s: s.break_on("changes", 3),
+    "poke of a text": lambda s: s.poke("z"),
+    "poke of a state as a text": lambda s: s.poke(state="slip"),
+    "steps below zero": lambda s: s.step(-1),
+    "steps back below zero": lambda s: s.back(-5),
+    "tree of no name": lambda s: s.tree.rename(0, " "),
+    "poke of all elements of a contact": (lambda s: s.poke({"bank.z": 1.0}), a_system),
+    "negative value of a fork": lambda s: s.tree.set({"F_s": -1.0}),
+    "unknown value of a fork": lambda s: s.tree.set({"q": 1.0}),
+    "value of several elements of a fork": lambda s: s.tree.set({"sigma": 1.0}),
+    "rows of a session": lambda s: Session(s.model, s.rig, 1.0, t_eval=[0.0, 1.0]),
+    "progress of a session": lambda s: Session(s.model, s.rig, 1.0, progress=print),
+    "no engine of a session": lambda s: Session(s.model, s.rig, 1.0, engine=None),
+    "poke of NaN": lambda s: s.poke({"z": {0: NAN}}),
+    "poke of infinity": lambda s: s.poke({"z": {0: INF}}),
+    "unknown law of a fork": lambda s: s.tree.fork(law="signd"),
+    "law of a system without one": (lambda s: s.tree.fork(law="signed"), locked),
+    "rig of a system": (lambda s: Session(s.system, None, 2.0), a_system),
+    "model without a rig": lambda s: Session(s.model, 2.0),
+    "locked velocity": (lambda s: s.poke({"w1": 0.1}), a_system),
+    "unknown state": lambda s: s.poke(state={0: "slipp"}),
 }
-group("session", SessionError, unmoved, rows, "")
-rows = {
-    "poke of a variable by its name": ("Session.poke", ..., lambda s: s.poke(z1=0.1)),
-    "poke of all elements at once": ("z", 0.1, lambda s: s.poke({"z": 0.1})),
-    "break on a change of a number": ("name", 3, lambda s: s.break_on("changes", 3)),
-    "poke of a text": ("variables", "z", lambda s: s.poke("z")),
-    "poke of a state as a text": ("state", "slip", lambda s: s.poke(state="slip")),
-    "steps below zero": ("count", -1, lambda s: s.step(-1)),
-    "steps back below zero": ("count", -5, lambda s: s.back(-5)),
-    "tree of no name": ("name", " ", lambda s: s.tree.rename(0, " ")),
-    "poke of all elements of a contact": (
-        "bank.z",
-        1.0,
-        lambda s: s.poke({"bank.z": 1.0}),
-        a_system,
-    ),
-}
-group("session", SessionError, unmoved, rows)
-rows = {
-    "negative value of a fork": (lambda s: s.tree.set({"F_s": -1.0}),),
-    "unknown value of a fork": (lambda s: s.tree.set({"q": 1.0}),),
-    "value of several elements of a fork": (lambda s: s.tree.set({"sigma": 1.0}),),
-    "rows of a session": (lambda s: Session(s.model, s.rig, 1.0, t_eval=[0.0, 1.0]),),
-    "progress of a session": (lambda s: Session(s.model, s.rig, 1.0, progress=print),),
-    "no engine of a session": (lambda s: Session(s.model, s.rig, 1.0, engine=None),),
-}
-group("session", ParameterError, unmoved, rows, "")
-rows = {
-    "poke of NaN": ("initial['z'][0] (element 1)", NAN, lambda s: s.poke({"z": {0: NAN}})),
-    "poke of infinity": ("initial['z'][0] (element 1)", INF, lambda s: s.poke({"z": {0: INF}})),
-    "unknown law of a fork": ("law", "signd", lambda s: s.tree.fork(law="signd")),
-    "law of a system without one": ("law", "signed", lambda s: s.tree.fork(law="signed"), locked),
-    "rig of a system": ("rig", None, lambda s: Session(s.system, None, 2.0), a_system),
-    "model without a rig": ("t_end", None, lambda s: Session(s.model, 2.0)),
-    "locked velocity": ("initial", ..., lambda s: s.poke({"w1": 0.1}), a_system),
-}
-group("session", ParameterError, unmoved, rows)
-rows = {"unknown state": (lambda s: s.poke(state={0: "slipp"}),)}
-group("session", ChartError, unmoved, rows, "")
+group("session", unmoved, rows)
 COLUMNS = {"z9 > 0": 1, "z1": 1, "state(1) == slide": 13, "z1 == 0.1": 7, "": 1, "exec(t)": 1}
 rows = {
-    f"condition {text!r}": (f"column {column}", ..., lambda s, text=text: s.until(text))
-    for text, column in COLUMNS.items()
+    f"condition {text!r}": lambda s, text=text: s.until(text) for text, column in COLUMNS.items()
 }
-group("session", ExpressionError, unmoved, rows)
+group("session", unmoved, rows)
 rows = {
-    f"condition {text!r}": (lambda s, text=text: s.until(text),)
+    f"condition {text!r}": lambda s, text=text: s.until(text)
     for text in ("v > 3 mm", "z1 > 3 mm/s", "F > 2 furlong", "abs(v) > 1 m")
 }
-group("session", UnitError, unmoved, rows, "")
+group("session", unmoved, rows)
 rows = {
-    "element too many": (lambda s: s.until("state(9) == slip"),),
-    "break on a change of what is unknown": (lambda s: s.break_on("changes", "z9 + 1"),),
-    "break on a change of a state of no element": (lambda s: s.break_on("changes", "state(9)"),),
-    "break on a change of a state without its number": (lambda s: s.break_on("changes", "state"),),
-    "way back to what is unknown": (lambda s: s.until("z9 > 0", back=True),),
-    "condition of a breakpoint": (lambda s: s.break_on("fires", "arrest", None, "z9 > 0"),),
+    "element too many": lambda s: s.until("state(9) == slip"),
+    "break on a change of what is unknown": lambda s: s.break_on("changes", "z9 + 1"),
+    "break on a change of a state of no element": lambda s: s.break_on("changes", "state(9)"),
+    "break on a change of a state without its number": lambda s: s.break_on("changes", "state"),
+    "way back to what is unknown": lambda s: s.until("z9 > 0", back=True),
+    "condition of a breakpoint": lambda s: s.break_on("fires", "arrest", None, "z9 > 0"),
     "name without its contact": (lambda s: s.parse("F > 1"), a_system),
     "variable without its element": (lambda s: s.parse("bank.z > 1"), a_system),
     "state without its contact": (lambda s: s.parse("state(1) == stuck"), a_system),
     "state without its element": (lambda s: s.parse("bank.state == slip"), a_system),
-}
-group("session", ExpressionError, unmoved, rows, "column 1")
-rows = {
     "poke of a number": (lambda s: s.poke({"m": 2.0}), a_system),
     "poke of a signal": (lambda s: s.poke({"r": 2.0}), a_system),
     "poke of a given velocity": (lambda s: s.poke({"belt.v": 1.0}), on_a_belt),
     "why of an element too many of a contact": (lambda s: s.why("bank 9"), a_system),
     "poke of a parameter of a contact": (lambda s: s.poke({"pad.F_c": 2.0}), a_system),
     "poke of a missing body": (lambda s: s.poke({"load.x": 2.0}), a_system),
-    "poke of an element too many of a contact": (
-        lambda s: s.poke({"bank.z": {4: 1.0}}),
-        a_system,
-    ),
+    "poke of an element too many of a contact": (lambda s: s.poke({"bank.z": {4: 1.0}}), a_system),
     "poke of the velocity of no body": (lambda s: s.poke(v=1.0), a_system),
     "state of no contact": (lambda s: s.poke(state={0: "stuck"}), a_system),
     "state of a contact with several elements": (
@@ -2674,7 +2197,7 @@ rows = {
     ),
     "break on a missing contact": (lambda s: s.break_on("fires", "arrest", "gear 1"), a_system),
 }
-group("session", SessionError, unmoved, rows, "")
+group("session", unmoved, rows)
 
 
 def editing(request: str, *, launched_first: bool = True, **given: object) -> object:
@@ -2692,23 +2215,19 @@ def framed(body: bytes) -> object:
 
 early = partial(editing, launched_first=False)
 rows = {
-    "no scenario": ("program", None, partial(early, "launch")),
-    "settings that are no list": (
-        "set", "a=1", partial(early, "launch", program="servo", set="a=1")),
-}  # fmt: skip
-group("editor", ScenarioError, called, rows)
-rows = {
-    "unknown request": ("", ..., partial(editing, "restart")),
-    "request before the launch": ("", ..., partial(early, "stackTrace")),
-    "paths that are URIs": ("pathFormat", ..., partial(early, "initialize", pathFormat="uri")),
-    "expression that is no text": ("expression", 3, partial(editing, "evaluate", expression=3)),
-    "file without a path": ("path", None, partial(editing, "setBreakpoints", source={})),
-    "frame of no row": ("", ..., partial(editing, "scopes", frameId=99)),
-    "scope of before": ("", ..., partial(editing, "variables", variablesReference=9)),
-    "message that is not JSON": ("", ..., lambda: framed(b"x")),
-    "message that is no object": ("", [], lambda: framed(b"[]")),
-}  # fmt: skip
-group("editor", SessionError, called, rows)
+    "no scenario": partial(early, "launch"),
+    "settings that are no list": partial(early, "launch", program="servo", set="a=1"),
+    "unknown request": partial(editing, "restart"),
+    "request before the launch": partial(early, "stackTrace"),
+    "paths that are URIs": partial(early, "initialize", pathFormat="uri"),
+    "expression that is no text": partial(editing, "evaluate", expression=3),
+    "file without a path": partial(editing, "setBreakpoints", source={}),
+    "frame of no row": partial(editing, "scopes", frameId=99),
+    "scope of before": partial(editing, "variables", variablesReference=9),
+    "message that is not JSON": lambda: framed(b"x"),
+    "message that is no object": lambda: framed(b"[]"),
+}
+group("editor", called, rows)
 
 
 def damaged(**changes: Any) -> None:
@@ -2738,11 +2257,7 @@ rows = {
     **{f"no {key}": {key: ...} for key in ("header", "t_end", "options", "branches", "current")},
 }
 group(
-    "session file",
-    TraceFileError,
-    lambda given: damaged(**given),
-    {name: (given,) for name, given in rows.items()},
-    "s.json",
+    "session file", lambda given: damaged(**given), {name: (given,) for name, given in rows.items()}
 )
 
 
@@ -2755,10 +2270,10 @@ def session_file(text: str) -> None:
 rows = {
     f"text {text!r}": (text,)
     for text in ("", "{", "[]", "null", "{}", '{"format": "other"}', "\0", "title = 'a scenario'")
-} | {"format alone": ('{"format": "gms-fsm session 1"}',)}
-group("session file", TraceFileError, session_file, rows, "odd.json")
-rows = {"missing file": ("nothing.json", ..., "nothing.json"), "folder": (".", ..., ".")}
-group("session file", TraceFileError, Session.load, rows)
+} | {"format alone": '{"format": "gms-fsm session 1"}'}
+group("session file", session_file, rows)
+rows = {"missing file": "nothing.json", "folder": "."}
+group("session file", Session.load, rows)
 
 
 def drawn_by_hand() -> Session:
@@ -2767,9 +2282,9 @@ def drawn_by_hand() -> Session:
 
 rows = {
     "function": (drawn_by_hand,),
-    "method of SciPy": (lambda: Session(*FIG4, 1.0, method=scipy.integrate.Radau),),
+    "method of SciPy": lambda: Session(*FIG4, 1.0, method=scipy.integrate.Radau),
 }
-group("saved session", SessionError, lambda made: made().save("s.json"), rows, "")
+group("saved session", lambda made: made().save("s.json"), rows)
 
 
 def exported(session: Session, name: str = "branch.toml", **poked: Any) -> None:
@@ -2780,17 +2295,17 @@ def exported(session: Session, name: str = "branch.toml", **poked: Any) -> None:
 
 
 rows = {
-    "session in a missing folder": ("", ..., lambda: fig4().save("no/folder/s.json")),
-    "scenario with another ending": ("one.json", ..., lambda: exported(fig4(), "one.json")),
+    "session in a missing folder": lambda: fig4().save("no/folder/s.json"),
+    "scenario with another ending": lambda: exported(fig4(), "one.json"),
 }
-group("saved", OutputError, lambda call: call(), rows)
+group("saved", called, rows)
 rows = {
-    "ticks": (lambda: exported(a_system(), variables={"one.x": 0.1}, t=1.0),),
-    "poke that a failed run does not reach": (
-        lambda: exported(Session(*FIG4, 40.0, max_steps=60), variables={"z": {0: 0.1}}, t=39.0),
+    "ticks": lambda: exported(a_system(), variables={"one.x": 0.1}, t=1.0),
+    "poke that a failed run does not reach": lambda: exported(
+        Session(*FIG4, 40.0, max_steps=60), variables={"z": {0: 0.1}}, t=39.0
     ),
 }
-group("exported session", SessionError, lambda call: call(), rows, "")
+group("exported session", called, rows)
 
 
 # --------------------------------------------------------------------------- proofs
@@ -2800,33 +2315,33 @@ TWO_PADS = System(
     contacts=(Contact("pad", FIG4[0]), Contact("other", FIG4[0])),
 )
 rows = {
-    "quotient in its domain": ("", ..., lambda: prove(gms_element("signed"), ["z / s > 1"])),
-    "no chart": ("chart", 3, lambda: prove(3)),  # type: ignore[arg-type]
-    "contact of a chart": ("contact", "pad", lambda: prove(gms_element("signed"), contact="pad")),
-    "which contact": ("contact", ..., lambda: prove(TWO_PADS)),
-    "unknown contact": ("", ..., lambda: prove(TWO_PADS, contact="pat")),
+    "quotient in its domain": lambda: prove(gms_element("signed"), ["z / s > 1"]),
+    "no chart": lambda: prove(3),  # type: ignore[arg-type]
+    "contact of a chart": lambda: prove(gms_element("signed"), contact="pad"),
+    "which contact": lambda: prove(TWO_PADS),
+    "unknown contact": lambda: prove(TWO_PADS, contact="pat"),
 }
-group("prove", ParameterError, lambda call: call(), rows)
+group("prove", called, rows)
 rows = {
-    "no chart": ("a", 3, lambda: diff(3, gms_element("signed"))),  # type: ignore[arg-type]
-    "path": ("b", "a.toml", lambda: diff(gms_element("signed"), "a.toml")),  # type: ignore[arg-type]
-    "chart and system": ("b", ..., lambda: diff(gms_element("signed"), TWO_PADS)),
-    "model and run": ("b", ..., lambda: diff(FIG4[0], simulate(*FIG4, 1.0))),
+    "no chart": lambda: diff(3, gms_element("signed")),  # type: ignore[arg-type]
+    "path": lambda: diff(gms_element("signed"), "a.toml"),  # type: ignore[arg-type]
+    "chart and system": lambda: diff(gms_element("signed"), TWO_PADS),
+    "model and run": lambda: diff(FIG4[0], simulate(*FIG4, 1.0)),
 }
-group("diff", ParameterError, lambda call: call(), rows)
+group("diff", called, rows)
 
 
 # --------------------------------------------------------------------------- tables of results
 NOTHING_SHOWN = PhenomenonResult("does not show", (), "")
 rows = {
-    "number": (lambda: NOTHING_SHOWN.number("loss"),),
-    "cell": (lambda: PhenomenaTable({}, (), ()).cell("lugre", "memory"),),
-    "draws": (lambda: Bootstrap(("k1",), np.zeros((3, 1))).interval("k2"),),
-    "two directions on a bench": (
-        lambda: measure_phenomena({"mine": placed("planar-coulomb", v=("v", "w"), inputs=PLANAR)}),
+    "number": lambda: NOTHING_SHOWN.number("loss"),
+    "cell": lambda: PhenomenaTable({}, (), ()).cell("lugre", "memory"),
+    "draws": lambda: Bootstrap(("k1",), np.zeros((3, 1))).interval("k2"),
+    "two directions on a bench": lambda: measure_phenomena(
+        {"mine": placed("planar-coulomb", v=("v", "w"), inputs=PLANAR)}
     ),
 }
-group("result without it", ParameterError, lambda call: call(), rows, "")
+group("result without it", called, rows)
 
 
 # --------------------------------------------------------------------------- trace files
@@ -2963,24 +2478,18 @@ rows = {
     "header is a list": ("header", lambda a: np.array("[]")),
     "header is deep": ("header", lambda a: np.array("[" * 100_000)),
 }
-group("array of a trace file", TraceFileError, array, rows, "run.npz")
+group("array of a trace file", array, rows)
 rows = {
-    "no header": (lambda a: a.pop("header"),),
-    "no dz": (lambda a: a.pop("observed_dz"),),
-    "no log": (lambda a: a.pop("log_t"),),
-    "no edges": (lambda a: a.pop("log_edge"),),
-    "no rows": (lambda a: a.update({n: v[:0] for n, v in a.items() if n[:3] in ("row", "obs")}),),
-}
-group("archive", TraceFileError, archive, rows, "run.npz")
-rows = {
+    "no header": lambda a: a.pop("header"),
+    "no dz": lambda a: a.pop("observed_dz"),
+    "no log": lambda a: a.pop("log_t"),
+    "no edges": lambda a: a.pop("log_edge"),
+    "no rows": lambda a: a.update({n: v[:0] for n, v in a.items() if n[:3] in ("row", "obs")}),
     "slide flag": (lambda a: a["rows_mode"].__setitem__((0, -1), 2), "run.npz", BELT),
+    "another ending": (lambda a: None, "run.txt"),
+    "no ending": (lambda a: None, ".npz"),
 }
-group("archive", TraceFileError, archive, rows, "run.npz")
-rows = {
-    "another ending": ("run.txt", ..., lambda a: None, "run.txt"),
-    "no ending": (".npz", ..., lambda a: None, ".npz"),
-}
-group("archive", TraceFileError, archive, rows)
+group("archive", archive, rows)
 rows = {
     "another format": ("format", "gms-fsm trace 99"),
     "unknown key": ("surprise", 1),
@@ -3018,18 +2527,18 @@ rows = {
     "edge to nowhere": ("model", "chart", "transitions", 0, "target", "nowhere"),
     "input no model supplies": ("model", "chart", "inputs", ["v", "s", "u"]),
 }
-group("header of a trace file", TraceFileError, header, rows, "run.npz")
+group("header of a trace file", header, rows)
 rows = {
-    "other columns": (lambda a: np.zeros(3, dtype=[("a", "f8")]),),
-    "two axes": (lambda a: a[:, None],),
-    "element too many": (lambda a: np.array([(0.0, 99, *list(r)[2:]) for r in a], a.dtype),),
-    "names of contacts": (lambda a: np.zeros(3, [*a.dtype.descr, ("contact", a.dtype["edge"])]),),
-    "unknown edge": (cell("edge", "nowhere"),),
-    "source of another edge": (cell("source", "slip"),),
-    "unknown target": (cell("target", "x"),),
-    "time that is not finite": (cell("t", NAN),),
+    "other columns": lambda a: np.zeros(3, dtype=[("a", "f8")]),
+    "two axes": lambda a: a[:, None],
+    "element too many": lambda a: np.array([(0.0, 99, *list(r)[2:]) for r in a], a.dtype),
+    "names of contacts": lambda a: np.zeros(3, [*a.dtype.descr, ("contact", a.dtype["edge"])]),
+    "unknown edge": cell("edge", "nowhere"),
+    "source of another edge": cell("source", "slip"),
+    "unknown target": cell("target", "x"),
+    "time that is not finite": cell("t", NAN),
 }
-group("log of format 1", TraceFileError, format_1, rows, "run.npz")
+group("log of format 1", format_1, rows)
 rows = {
     "bad JSON": (0, '"model"', "model"),
     "missing column": (1, ",v,", ",u,"),
@@ -3041,52 +2550,34 @@ rows = {
     "huge micro-step": (3, ",0,", f",{10**30},"),
     "endless cell": (3, ",0,", f",{'0' * 200_000},"),
     "hostile flow": (0, '"z": "v"', '"z": "__import__(\'os\').getpid()"'),
-}
-group("line of a CSV trace", TraceFileError, replaced, rows, "run.csv")
-rows = {
-    "short row": ("run.csv: line 4", ..., 3, ",", ""),
-    "long row": ("run.csv: line 4", ..., 3, ",", ",,"),
-}
-group("line of a CSV trace", TraceFileError, replaced, rows)
-rows = {
+    "short row": (3, ",", ""),
+    "long row": (3, ",", ",,"),
     "log without a column": (0, "edge", "ledge", LOG),
     "log with a short row": (1, ",", "", LOG),
     "log with a word for a number": (1, ",1,", ",one,", LOG),
     "log with a huge element": (1, ",1,", f",{10**30},", LOG),
 }
-group("line of a CSV trace", TraceFileError, replaced, rows, "run.transitions.csv")
+group("line of a CSV trace", replaced, rows)
 rows = {
-    "no header": (lambda text: text.pop(0),),
-    "no head line": (lambda text: text.pop(1),),
-    "deep JSON": (lambda text: text.__setitem__(0, "# {" + '"a":[' * 50_000),),
+    "no header": lambda text: text.pop(0),
+    "no head line": lambda text: text.pop(1),
+    "deep JSON": lambda text: text.__setitem__(0, "# {" + '"a":[' * 50_000),
+    "only a header": lambda text: text.__delitem__(slice(1, None)),
 }
-group("lines of a CSV trace", TraceFileError, lines, rows, "run.csv")
+group("lines of a CSV trace", lines, rows)
 rows = {
-    "only a header": ("run.csv: line 2", ..., lambda text: text.__delitem__(slice(1, None))),
-}
-group("lines of a CSV trace", TraceFileError, lines, rows)
-rows = {
-    "log for the trace": ("run.csv", ..., lambda: {"run.csv": saved(".csv")[LOG]}),
-    "no log": ("run.transitions.csv", ..., lambda: {"run.csv": saved(".csv")["run.csv"]}),
-    "empty log": ("run.transitions.csv", ..., lambda: {**saved(".csv"), LOG: b""}),
-    "no text": ("run.csv", ..., lambda: {**saved(".csv"), "run.csv": b"# {\xff\xfe\x00}"}),
-    "log that is no text": ("run.csv", ..., lambda: {**saved(".csv"), LOG: b"\xff\xfe\x00"}),
-    "missing archive": ("none.npz", ..., lambda: {}, "none.npz"),
-    "missing CSV": ("none.csv", ..., lambda: {}, "none.csv"),
-}
-group("files of a trace", TraceFileError, lambda contents, *path: files(contents(), *path), rows)
-rows = {
+    "log for the trace": lambda: {"run.csv": saved(".csv")[LOG]},
+    "no log": lambda: {"run.csv": saved(".csv")["run.csv"]},
+    "empty log": lambda: {**saved(".csv"), LOG: b""},
+    "no text": lambda: {**saved(".csv"), "run.csv": b"# {\xff\xfe\x00}"},
+    "log that is no text": lambda: {**saved(".csv"), LOG: b"\xff\xfe\x00"},
+    "missing archive": (lambda: {}, "none.npz"),
+    "missing CSV": (lambda: {}, "none.csv"),
     "archive cut in half": (lambda: {"run.npz": saved(".npz")["run.npz"][:2000]}, "run.npz"),
     "archive cut to nothing": (lambda: {"run.npz": b""}, "run.npz"),
     "archive without its end": (lambda: {"run.npz": saved(".npz")["run.npz"][:-20]}, "run.npz"),
 }
-group(
-    "files of a trace",
-    TraceFileError,
-    lambda contents, *path: files(contents(), *path),
-    rows,
-    "run.npz",
-)
+group("files of a trace", lambda contents, *path: files(contents(), *path), rows)
 
 
 # --------------------------------------------------------------------------- systems
@@ -3182,40 +2673,34 @@ def named(name: str, kind: str) -> None:
 
 
 rows = {
-    "an inertia": ("body 'one', inertia, column 1", ..., '"m"\nforce', '"mm"\nforce'),
-    "a force": ("body 'one', force, column 5", ..., "q - x1", "q - x9"),
-    "an unknown velocity": ("contact 'pad', v, column 1", ..., 'v = "v2"\n[c', 'v = "v3"\n[c'),
-    "an input": ("contact 'gear', input 's', column 1", ..., "inputs.s = 1", 'inputs.s = "z9"'),
-    "a signal": ("signal 'r', column 1", ..., "m * sin", "M * sin"),
-    "a flow": ("flow of 'i', column 1", ..., '"(r - i) /', '"(r - i /'),
-    "an update": ("sampled 'pid', 'u', column 5", ..., "m * x1", "m * y1"),
-    "a stiffness": ("spring 'shaft', k, column 5", ..., "2 * m", "2 * x1"),
-    "a ratio": ("spring 'shaft', ratio, column 1", ..., "ratio = 3", 'ratio = "t"'),
-    "a rest": ("spring 'shaft', rest, column 1", ..., 'rest = "r"', 'rest = "v1"'),
-    "a chart file": ("chart 'a', state 'b', output 'F', column 1", ..., '"lugre"', '"a.toml"'),
-}
-group("system file", ExpressionError, system_file, rows)
-rows = {
-    "no inertia": ("line 13, body.1: body 'two'", ..., "inertia = 2\n", ""),
-    "zero inertia": ("system 'pair', body 'two'", ..., "inertia = 2", "inertia = 0"),
-    "a velocity": ("system 'pair', contact 'gear'", ..., "v1 - 2 * v2", "v1 * v2"),
-    "an unread input": ("system 'pair', contact 'gear'", ..., "inputs.s", "inputs.q"),
-    "an unbound input": ("system 'pair', contact 'gear'", ..., "inputs.s = 1\n", ""),
-    "a value": ("contact.0.values.sigma_1", -31.6, "31.6", "-31.6"),
-    "an unknown chart": ("line 21, contact.0.chart", ..., '"lugre"', '"lugree"'),
-    "no chart": ("line 18, contact.0: contact 'gear'", ..., 'chart = "lugre"\n', ""),
-    "a name used twice": ("line 16, body.1.x: system 'pair'", ..., '"x2"', '"x1"'),
-    "a contact's name": ("line 25, contact.1.name: system 'pair'", ..., '"pad"', '"gear"'),
-    "a period": ("line 31, sampled.0: sampled 'pid': period", 0.0, "1e-3", "0"),
-    "an end": ("system 'pair', spring 'shaft'", ..., 'second = "two"', 'second = "tow"'),
-    "the same end": ("spring.0.second: spring 'shaft'", ..., 'second = "two"', 'second = "one"'),
-    "a negative stiffness": ("spring 'shaft', k", "-2 * m", '"2 * m"', '"-2 * m"'),
-    "a negative damping": ("spring 'shaft', d", -0.5, "d = 0.5", "d = -0.5"),
-    "a spring of nothing": ("spring.0: spring 'shaft'", ..., 'k = "2 * m"\nd = 0.5\n', ""),
-    "a spring's name": ("line 36, spring.0.name: system 'pair'", ..., '"shaft"', '"two"'),
-}
-group("system file", ParameterError, system_file, rows)
-rows = {
+    "an inertia": ('"m"\nforce', '"mm"\nforce'),
+    "a force": ("q - x1", "q - x9"),
+    "an unknown velocity": ('v = "v2"\n[c', 'v = "v3"\n[c'),
+    "an input": ("inputs.s = 1", 'inputs.s = "z9"'),
+    "a signal": ("m * sin", "M * sin"),
+    "a flow": ('"(r - i) /', '"(r - i /'),
+    "an update": ("m * x1", "m * y1"),
+    "a stiffness": ("2 * m", "2 * x1"),
+    "a ratio": ("ratio = 3", 'ratio = "t"'),
+    "a rest": ('rest = "r"', 'rest = "v1"'),
+    "a chart file": ('"lugre"', '"a.toml"'),
+    "no inertia": ("inertia = 2\n", ""),
+    "zero inertia": ("inertia = 2", "inertia = 0"),
+    "a velocity": ("v1 - 2 * v2", "v1 * v2"),
+    "an unread input": ("inputs.s", "inputs.q"),
+    "an unbound input": ("inputs.s = 1\n", ""),
+    "a value": ("31.6", "-31.6"),
+    "an unknown chart": ('"lugre"', '"lugree"'),
+    "no chart": ('chart = "lugre"\n', ""),
+    "a name used twice": ('"x2"', '"x1"'),
+    "a contact's name": ('"pad"', '"gear"'),
+    "a period": ("1e-3", "0"),
+    "an end": ('second = "two"', 'second = "tow"'),
+    "the same end": ('second = "two"', 'second = "one"'),
+    "a negative stiffness": ('"2 * m"', '"-2 * m"'),
+    "a negative damping": ("d = 0.5", "d = -0.5"),
+    "a spring of nothing": ('k = "2 * m"\nd = 0.5\n', ""),
+    "a spring's name": ('"shaft"', '"two"'),
     "a preset": ("stick-slip", "stick"),
     "an unknown model": ('"GMS"', '"GMs"'),
     "a number": ("{ m = 1.0 }", '{ m = "1" }'),
@@ -3225,19 +2710,17 @@ rows = {
     "a scenario of a system": ('name = "pair"', 'name = "pair"\nrun.t_end = 1.0'),
     "a model on a rig": ('name = "pair"', 'rig.kind = "prescribed"\nname = "pair"'),
 }
-group("system file", ScenarioError, system_file, rows, "own.toml")
-rows = {"scenario of the package": ("servo",)}
-group("system file", ScenarioError, System.load, rows, "servo")
+group("system file", system_file, rows)
+rows = {"scenario of the package": "servo"}
+group("system file", System.load, rows)
 FUNCTION = '{ kind = "function" }'
 rows = {
-    "a chart elsewhere": ("contact.0.chart", "../a.toml", '"lugre"', '"../a.toml"'),
-    "a function": ("line 6, signals.q: signal 'q'", ..., "[[0, 0], [1, 2]]", FUNCTION),
+    "a chart elsewhere": ('"lugre"', '"../a.toml"'),
+    "a function": ("[[0, 0], [1, 2]]", FUNCTION),
+    "ramps": ("[[0, 0]", "[[5, 0]"),
+    "no chart file": ('"lugre"', '"b.toml"'),
 }
-group("system file", ScenarioError, system_file, rows)
-rows = {"ramps": ("line 6, signals.q: signal", ..., "[[0, 0]", "[[5, 0]")}
-group("system file", SignalError, system_file, rows)
-rows = {"no chart file": ("line 21, contact.0.chart: b.toml", ..., '"lugre"', '"b.toml"')}
-group("system file", ChartError, system_file, rows)
+group("system file", system_file, rows)
 
 
 def made(**parts: Any) -> None:
@@ -3266,99 +2749,84 @@ DAHL = Contact("p", CHARTS["dahl"], {"sigma_0": 1.0, "F_c": 1.0}, inputs={"N": "
 DIFFERENCE = {"inertia": "a - b"}
 MOVING = Prescribed("0.1")
 rows = {
-    "offset in v": ("contact 'pad'", ..., {"contacts": (Contact("pad", WELD, v="v + 1"),)}),
+    "offset in v": {"contacts": (Contact("pad", WELD, v="v + 1"),)},
     **{
-        f"{text} in v": (
-            "contact 'pad'",
-            ...,
-            {"contacts": (Contact("pad", WELD, v=f"v + {text}"),), "numbers": {"m": 1.0}},
-        )
+        f"{text} in v": {
+            "contacts": (Contact("pad", WELD, v=f"v + {text}"),),
+            "numbers": {"m": 1.0},
+        }
         for text in ("1 / m", "exp(m)")
     },
-    "number among the bodies": ("bodies", 3, {"bodies": (Body("mass", inertia=1.0), 3)}),
-    "negative": ("body 'mass'", ..., {"body": DIFFERENCE, "numbers": {"a": 1.0, "b": 2.0}}),
-    "no number": ("body 'mass'", ..., {"body": {"inertia": "1 / m"}, "numbers": {"m": 0.0}}),
-    "motion": ("body 'mass': motion", "rotary", {"body": {"motion": "rotary"}}),
-    "rotary": ("body 'mass': rotary", 1, {"body": {"rotary": 1}}),
-    "turns and moves": ("", "normal", {"body": {"motion": "normal", "rotary": True}}),
-    "unit of nothing": ("system 'one': units", ..., {"units": {"r": "m"}}),
-    "unit with a prefix": ("", "mm", {"numbers": {"r": 1.0}, "units": {"r": "mm"}}),
-    "velocity of other units": (
-        "system 'one', contact 'p'",
-        ...,
-        {
-            "body": {"rotary": True},
-            "contacts": (Contact("p", WELD, v="r * v"),),
-            "numbers": {"r": 1.0},
-            "units": {"r": "N"},
-        },
-    ),
-    "stiffness": ("k", "-a", {"springs": (Spring("s", "mass", k="-a"),), "numbers": {"a": 1.0}}),
-    "locks that repeat": ("system 'one'", ..., {"contacts": TWICE}),
-    "load without a curve": ("system 'one', contact 'p'", ..., {"contacts": (DAHL,)}),
-    "period": ("system 'one'", ..., {"sampled": pid(u="period"), "numbers": {"period": 2.0}}),
-    "let of a name that is taken": ("", ..., {"let": {"t": "1"}}),
-    "driven body alone": ("contact 'pad'", ..., {"body": {"inertia": None, "velocity": "1"}}),
-    "samplers without number": (
-        "",
-        ...,
-        {"sampled": [Sampled(f"s{i}", period=0.1, updates={f"u{i}": "1"}) for i in range(63)]},
-    ),
-    "ticks without number": ("pid", ..., {"sampled": pid(1e-9, u="x")}),
-}
-group("system", ParameterError, lambda given: made(**given), rows)
-rows = {
-    "values beside a model": (
-        "contact 'pad'", ..., lambda: Contact("pad", stick_slip("signed"), DRY)),
-    "delay of an expression": (
-        "sampled 'pid': updates", ..., lambda: pid(u="delay(2 * x, 3)")),
-    "delay by nothing": ("sampled 'pid'", ..., lambda: pid(u="delay(x, 0)")),
-    "start of what is not updated": (
-        "sampled 'pid'", ..., partial(Sampled, "pid", period=1, updates={"u": "1"}, initial=DRY)),
-    "number of another rig of the same shape": ("system 'own': m", INF, other_number),
-    **{
-        f"acceleration {text}": ("rig 'own'", ..., partial(accelerated, text))
-        for text in ("t", "F * F", "sin(F)")
+    "number among the bodies": {"bodies": (Body("mass", inertia=1.0), 3)},
+    "negative": {"body": DIFFERENCE, "numbers": {"a": 1.0, "b": 2.0}},
+    "no number": {"body": {"inertia": "1 / m"}, "numbers": {"m": 0.0}},
+    "motion": {"body": {"motion": "rotary"}},
+    "rotary": {"body": {"rotary": 1}},
+    "turns and moves": {"body": {"motion": "normal", "rotary": True}},
+    "unit of nothing": {"units": {"r": "m"}},
+    "unit with a prefix": {"numbers": {"r": 1.0}, "units": {"r": "mm"}},
+    "velocity of other units": {
+        "body": {"rotary": True},
+        "contacts": (Contact("p", WELD, v="r * v"),),
+        "numbers": {"r": 1.0},
+        "units": {"r": "N"},
     },
-}  # fmt: skip
-group("part of a system", ParameterError, lambda call: call(), rows)
+    "stiffness": {"springs": (Spring("s", "mass", k="-a"),), "numbers": {"a": 1.0}},
+    "locks that repeat": {"contacts": TWICE},
+    "load without a curve": {"contacts": (DAHL,)},
+    "period": {"sampled": pid(u="period"), "numbers": {"period": 2.0}},
+    "let of a name that is taken": {"let": {"t": "1"}},
+    "driven body alone": {"body": {"inertia": None, "velocity": "1"}},
+    "samplers without number": {
+        "sampled": [Sampled(f"s{i}", period=0.1, updates={f"u{i}": "1"}) for i in range(63)]
+    },
+    "ticks without number": {"sampled": pid(1e-9, u="x")},
+}
+group("system", lambda given: made(**given), rows)
 rows = {
-    key: ("", ..., lambda key=key: simulate(load_system("servo"), 0.1, initial={key: 1.0}))
+    "values beside a model": lambda: Contact("pad", stick_slip("signed"), DRY),
+    "delay of an expression": lambda: pid(u="delay(2 * x, 3)"),
+    "delay by nothing": lambda: pid(u="delay(x, 0)"),
+    "start of what is not updated": partial(
+        Sampled, "pid", period=1, updates={"u": "1"}, initial=DRY
+    ),
+    "number of another rig of the same shape": other_number,
+    **{f"acceleration {text}": partial(accelerated, text) for text in ("t", "F * F", "sin(F)")},
+}
+group("part of a system", called, rows)
+rows = {
+    key: lambda key=key: simulate(load_system("servo"), 0.1, initial={key: 1.0})
     for key in ("load.y", "w", "bearing.state")
 }
-group("initial value of a system", ParameterError, called, rows)
-rows = {"pairs in a pair": ("signal", ..., ((0.0, 0.0), (1.0, 2.0)))}
-group("signal", SignalError, Prescribed, rows)
+group("initial value of a system", called, rows)
+rows = {"pairs in a pair": (((0.0, 0.0), (1.0, 2.0)),)}
+group("signal", Prescribed, rows)
 rows = {
-    "force of a contact": ("body 'mass', force, column 1", ..., {"body": {"force": "F"}}),
-    "force in an update": ("sampled 'pid', 'u', column 5", ..., {"sampled": pid(u="2 * F")}),
-    "let that reads a later one": ("let 'a', column 1", ..., {"let": {"a": "b", "b": "1"}}),
+    "force of a contact": {"body": {"force": "F"}},
+    "force in an update": {"sampled": pid(u="2 * F")},
+    "let that reads a later one": {"let": {"a": "b", "b": "1"}},
 }
-group("system", ExpressionError, lambda given: made(**given), rows)
+group("system", lambda given: made(**given), rows)
 rows = {
-    "bank": ("chart 'Coulomb friction with stiction'", ..., partial(ChartModel, n=2)),
-    "on a prescribed motion": (
-        "contact 'friction'",
-        ...,
-        lambda *model: simulate(ChartModel(*model), MOVING, 1.0),
-    ),
-    "start in motion": ("initial", ..., lambda *_: simulate(system(), 1.0, initial={"v": 0.3})),
+    "bank": partial(ChartModel, n=2),
+    "on a prescribed motion": lambda *model: simulate(ChartModel(*model), MOVING, 1.0),
+    "start in motion": lambda *_: simulate(system(), 1.0, initial={"v": 0.3}),
 }
-group("lock", ParameterError, lambda call: call(STICTION_CHART, DRY), rows)
-rows = {name: ("contact 'pad'", ..., name) for name in "svt"}
-group("input of a contact", ParameterError, lambda name: pad(**{name: "5"}), rows)
-rows = {"state that gives way": (edge(impulse=True),)}
-group("impulse", ChartError, chart, rows, "chart 'rubber', edge 'go'")
+group("lock", lambda call: call(STICTION_CHART, DRY), rows)
+rows = {name: (name,) for name in "svt"}
+group("input of a contact", lambda name: pad(**{name: "5"}), rows)
+rows = {"state that gives way": edge(impulse=True)}
+group("impulse", chart, rows)
 rows = {"function": (abs,), "very long record": ((TIMES := np.arange(60_000) / 7.0, TIMES),)}
-group("saved system", OutputError, saved_system, rows, "own.toml")
+group("saved system", saved_system, rows)
 
 CALLED = dict.fromkeys("xvtF", "'pushed'") | dict.fromkeys(("exp", "pi"), "system 'pushed', KIND")
 rows = {
-    f"{kind} called {name}": (place.replace("KIND", kind), ..., name, kind)
+    f"{kind} called {name}": (name, kind)
     for name, place in CALLED.items()
     for kind in ("number", "signal")
 }
-group("name of a rig", ParameterError, named, rows)
+group("name of a rig", named, rows)
 
 
 # --------------------------------------------------------------------------- signals
@@ -3376,33 +2844,21 @@ WRONG: tuple[Any, ...] = (
     *(([0, 1], ["a", "b"]), ([[0, 1]], [0, 1]), (0, 1)),
 )
 rows = {repr(signal): (signal,) for signal in WRONG} | {
-    "an array of two rows": (np.zeros((2, 3)),),
+    "an array of two rows": np.zeros((2, 3)),
     "a number of 400 digits": (HUGE,),
-    "ramps to it": ([(0, HUGE), (1, 0)],),
+    "ramps to it": [(0, HUGE), (1, 0)],
     "a record of it": (([0, 1], [0, -HUGE]),),
-    "very many words": (["x"] * 100_000,),
+    "very many words": ["x"] * 100_000,
 }
-group("signal", SignalError, Prescribed, rows, "signal")
-rows = {
-    text: (f"signal, column {column}", ..., text)
-    for text, column in {"t > 1": 1, "t.real": 1, "sin(x)": 5, "t +": 4}.items()
-}
-group("signal", ExpressionError, Prescribed, rows)
-rows = {"of nothing": ("signal, column 1", ..., "")}
-group("signal", ExpressionError, Prescribed, rows)
-rows = {
-    "two numbers": (lambda t: np.array([0.1, 0.2]),),
-    "nothing": (lambda t: None,),
-}
-group(
-    "function of time",
-    SimulationError,
-    lambda v: simulate(GIVEN, Prescribed(v), 1.0),
-    rows,
-    "",
-)
+group("signal", Prescribed, rows)
+rows = {text: (text,) for text, column in {"t > 1": 1, "t.real": 1, "sin(x)": 5, "t +": 4}.items()}
+group("signal", Prescribed, rows)
+rows = {"of nothing": ""}
+group("signal", Prescribed, rows)
+rows = {"two numbers": lambda t: np.array([0.1, 0.2]), "nothing": lambda t: None}
+group("function of time", lambda v: simulate(GIVEN, Prescribed(v), 1.0), rows)
 rows = {f"{t} s": (t,) for t in (0.999, 3.0)}
-group("start of a record", SignalError, starting, rows, "")
+group("start of a record", starting, rows)
 
 
 # --------------------------------------------------------------------------- built-in charts
@@ -3411,21 +2867,17 @@ def entry_of(made_of: Any, values: Mapping[str, Any], stribeck: Stribeck | None 
     return Entry("mine", made_of, Demonstration(values, "", stribeck=stribeck))
 
 
-rows = {repr(law): ("law", law, law) for law in ("Published", "", None, 1)}
-group("law of the GMS element", ParameterError, gms_element, rows)
+rows = {repr(law): (law,) for law in ("Published", "", None, 1)}
+group("law of the GMS element", gms_element, rows)
 rows = {
-    "gms without a law": ("law", "", lambda: entry("gms").chart("")),
-    "gms with an unknown law": ("law", "al-bender", lambda: entry("gms").chart("al-bender")),
-    "GMS with an unknown law": ("law", "fair", lambda: GMS(bank(), law="fair")),
-    "lugre with a law": ("", ..., lambda: entry("lugre").chart("signed")),
-    "unknown": ("", ..., lambda: entry("coulomb")),
-    "curve that is not read": (
-        "chart 'r'",
-        ...,
-        lambda: ChartModel(one_state("k"), {"k": 1.0}, stribeck=1.0),
-    ),
+    "gms without a law": lambda: entry("gms").chart(""),
+    "gms with an unknown law": lambda: entry("gms").chart("al-bender"),
+    "GMS with an unknown law": lambda: GMS(bank(), law="fair"),
+    "lugre with a law": lambda: entry("lugre").chart("signed"),
+    "unknown": lambda: entry("coulomb"),
+    "curve that is not read": lambda: ChartModel(one_state("k"), {"k": 1.0}, stribeck=1.0),
 }
-group("built-in chart", ParameterError, called, rows)
+group("built-in chart", called, rows)
 
 rows = {
     "missing value": (CHARTS["lugre"], {"sigma_0": 1.0}, STRIBECK),
@@ -3437,21 +2889,16 @@ rows = {
     "no chart": ({}, {}),
     "laws with other parameters": ({"a": one_state("k"), "b": one_state()}, {"k": 0.0}),
 }
-AT = dict.fromkeys((*rows,)[-3:], "entry 'mine'") | {"value against its rule": "k"}
-rows = {
-    name: (AT.get(name, "demonstration"), 0.0 if name in AT and AT[name] == "k" else ..., *given)
-    for name, given in rows.items()
-}
-group("entry of a chart", ChartError, entry_of, rows)
-rows = {str(delta): ("delta", delta, delta) for delta in (0.0, 0.05, 21.0, NAN)}
-group("exponent of a curve", ParameterError, lambda delta: curve(delta=delta), rows)
+group("entry of a chart", entry_of, rows)
+rows = {str(delta): (delta,) for delta in (0.0, 0.05, 21.0, NAN)}
+group("exponent of a curve", lambda delta: curve(delta=delta), rows)
 
 rows = {
-    "F_s": ("F_s", ..., curve, {"F_s": 10**400}),
-    "k": ("k", ..., bank, {"k": [10**400, 1]}),
-    "very many words": ("F_c", ["x"] * 100_000, curve, {"F_c": ["x"] * 100_000}),
+    "F_s": (curve, {"F_s": 10**400}),
+    "k": (bank, {"k": [10**400, 1]}),
+    "very many words": (curve, {"F_c": ["x"] * 100_000}),
 }
-group("number that no float holds", ParameterError, lambda make, given: make(**given), rows)
+group("number that no float holds", lambda make, given: make(**given), rows)
 
 
 # --------------------------------------------------------------------------- traces of systems
@@ -3496,44 +2943,31 @@ rows = {
     "edge": (cell("edge", "break_away_forward"), BELT),
     "element": (cell("element", 1), BELT),
 }
-group("log of a system of format 1", TraceFileError, format_1, rows, "run.npz")
+group("log of a system of format 1", format_1, rows)
 rows = {
     "edge of another contact": (edge_of_another, "run.npz", BELT),
     "no system": (no_system, "run.npz", BELT),
 }
-group("archive of a system", TraceFileError, archive, rows, "run.npz")
+group("archive of a system", archive, rows)
+rows = {"array": "array", "folder": "npz", "CSV": "csv", "folder of runs": "out"}
+group("no trace", no_trace, rows)
+rows = {"what one contact sees": "pad"}
+group("saved trace", lambda name: ran(BELT).contact(name).save("run.npz"), rows)
 rows = {
-    "array": ("run.npz", ..., "array"),
-    "folder": ("run.npz", ..., "npz"),
-    "CSV": ("run.csv", ..., "csv"),
-    "folder of runs": ("out", ..., "out"),
+    "unknown contact": "gear: all",
+    "unknown contact of an object": CoverageMonitor("gear"),
+    "no contact": "F < 2",
+    "name of the system for a contact": "pad: q1 < 2",
 }
-group("no trace", TraceFileError, no_trace, rows)
-rows = {"what one contact sees": ("pad",)}
-group(
-    "saved trace",
-    OutputError,
-    lambda name: ran(BELT).contact(name).save("run.npz"),
-    rows,
-    "run.npz",
-)
-rows = {
-    "unknown contact": ("gear: all",),
-    "unknown contact of an object": (CoverageMonitor("gear"),),
-}
-group("monitors of a system", ParameterError, watched, rows, "")
-rows = {"no contact": ("F < 2",), "name of the system for a contact": ("pad: q1 < 2",)}
-group("monitors of a system", ExpressionError, watched, rows, "invariant, column 1")
+group("monitors of a system", watched, rows)
 rows = {each: (each,) for each in ("passivity", "coverage", "z <= s")}
-group("monitors of the end", ParameterError, rows_wanted, rows, "")
+group("monitors of the end", rows_wanted, rows)
 rows = {
-    "in a session": (
-        "",
-        ...,
-        lambda: Session(stick_slip("signed"), Prescribed(0.2), 5.0, monitors=["coverage"]),
+    "in a session": lambda: Session(
+        stick_slip("signed"), Prescribed(0.2), 5.0, monitors=["coverage"]
     )
 }
-group("monitors", ParameterError, called, rows)
+group("monitors", called, rows)
 
 
 # --------------------------------------------------------------------------- coverage
@@ -3560,25 +2994,21 @@ def covering(*words: str) -> None:
 
 
 rows = {
-    "other chart": ("", ..., lambda: counted() + counted(law="published")),
-    "system and model": ("", ..., lambda: coverage([counted(), ran(BELT)])),
-    "number for a run": ("what", 3, lambda: coverage(3)),
-    "name for a run": ("what", "pulled_mass", lambda: coverage("pulled_mass")),
-    "no runs": ("", ..., lambda: coverage([])),
-    "number to add": ("other", 1, lambda: counted() + 1),
-    "sweep of a file": ("what", ..., lambda: coverage(swept_and_saved())),
-    "word for clauses": ("coverage", "all", lambda: sweeping({"F_s": [1.5]}, coverage="all")),
-    "unknown contact": ("", ..., lambda: counted().contact("gear")),
-    "which of several contacts": ("", ..., lambda: coverage(ran(BELT)).contact()),
+    "other chart": lambda: counted() + counted(law="published"),
+    "system and model": lambda: coverage([counted(), ran(BELT)]),
+    "number for a run": lambda: coverage(3),
+    "name for a run": lambda: coverage("pulled_mass"),
+    "no runs": lambda: coverage([]),
+    "number to add": lambda: counted() + 1,
+    "sweep of a file": lambda: coverage(swept_and_saved()),
+    "word for clauses": lambda: sweeping({"F_s": [1.5]}, coverage="all"),
+    "unknown contact": lambda: counted().contact("gear"),
+    "which of several contacts": lambda: coverage(ran(BELT)).contact(),
+    "no file": lambda: Coverage.load("gone.json"),
+    "folder for a file": lambda: Coverage.load("."),
+    "into no folder": lambda: counted().save("gone/counts.json"),
 }
-group("coverage", ParameterError, called, rows)
-rows = {
-    "no file": ("gone.json", ..., lambda: Coverage.load("gone.json")),
-    "folder for a file": (".", ..., lambda: Coverage.load(".")),
-}
-group("coverage", TraceFileError, called, rows)
-rows = {"into no folder": ("", ..., lambda: counted().save("gone/counts.json"))}
-group("coverage", OutputError, called, rows)
+group("coverage", called, rows)
 
 
 KINDS: dict[str, Callable[[], object]] = {
@@ -3598,58 +3028,52 @@ def of_another_kind(load: Callable[[str], object], name: str) -> None:
 
 
 rows = {
-    f"{load.__self__.__name__} of {name}": (name, ..., load, name)  # type: ignore[attr-defined]
+    f"{load.__self__.__name__} of {name}": (load, name)  # type: ignore[attr-defined]
     for load in (Trace.load, Session.load, Sweep.load, Coverage.load)
     for name in KINDS
     if (load.__self__, name)  # type: ignore[attr-defined]
     not in ((Trace, "run.npz"), (Session, "s.json"), (Sweep, "swept.npz"), (Coverage, "other.json"))
 }
-group("file of another kind", TraceFileError, of_another_kind, rows)
+group("file of another kind", of_another_kind, rows)
 rows = {
-    "counts of another chart": ("other.json", ..., "a.toml", "--merge", "other.json"),
-    "counts of a system": ("system.json", ..., "a.toml", "--merge", "system.json"),
-    "scenarios of two charts": ("servo", ..., "a.toml", "servo"),
-    "picture of several charts": ("-o", ..., "pair.toml", "-o", "c.svg"),
-    "missing contact": ("--contact pad", ..., "pair.toml", "-o", "c.svg", "--contact", "pad"),
-    "contact of a model": ("--contact pad", ..., "a.toml", "-o", "c.svg", "--contact", "pad"),
-    "missing contact, in words": ("--contact pad", ..., "pair.toml", "--contact", "pad"),
-    "contact of a model, in words": ("--contact pad", ..., "a.toml", "--contact", "pad"),
-    "override of a trace": ("run.npz", ..., "run.npz", "--set", "run.t_end=1"),
-    "sweep of a trace": ("run.npz", ..., "run.npz", "--over", "F_s=1:2:2"),
-    "grid that is none": ("--over F_s", ..., "a.toml", "--over", "F_s"),
-    "ending of a picture": ("path", "c.jpg", "a.toml", "-o", "c.jpg"),
-    "two charts at once": ("servo", ..., "stiction", "servo", "--generate"),
-    "motions into counts": ("--merge", ..., "stiction", "--generate", "--merge", "c.json"),
-    "motions over a grid": ("--over", ..., "stiction", "--generate", "--over", "F_s=1:2:2"),
-    "seed of given runs": ("--seed", ..., "a.toml", "--seed", "1"),
-    "bounds that are none": ("--bounds v", ..., "stiction", "--generate", "--bounds", "v"),
-    "contact of a chart": ("--contact a", ..., "stiction", "--generate", "--contact", "a"),
-    "which contact to try": ("pair.toml", ..., "pair.toml", "--generate"),
+    "counts of another chart": ("a.toml", "--merge", "other.json"),
+    "counts of a system": ("a.toml", "--merge", "system.json"),
+    "scenarios of two charts": ("a.toml", "servo"),
+    "picture of several charts": ("pair.toml", "-o", "c.svg"),
+    "missing contact": ("pair.toml", "-o", "c.svg", "--contact", "pad"),
+    "contact of a model": ("a.toml", "-o", "c.svg", "--contact", "pad"),
+    "missing contact, in words": ("pair.toml", "--contact", "pad"),
+    "contact of a model, in words": ("a.toml", "--contact", "pad"),
+    "override of a trace": ("run.npz", "--set", "run.t_end=1"),
+    "sweep of a trace": ("run.npz", "--over", "F_s=1:2:2"),
+    "grid that is none": ("a.toml", "--over", "F_s"),
+    "ending of a picture": ("a.toml", "-o", "c.jpg"),
+    "two charts at once": ("stiction", "servo", "--generate"),
+    "motions into counts": ("stiction", "--generate", "--merge", "c.json"),
+    "motions over a grid": ("stiction", "--generate", "--over", "F_s=1:2:2"),
+    "seed of given runs": ("a.toml", "--seed", "1"),
+    "bounds that are none": ("stiction", "--generate", "--bounds", "v"),
+    "contact of a chart": ("stiction", "--generate", "--contact", "a"),
+    "which contact to try": ("pair.toml", "--generate"),
 }
-group("cover", ParameterError, covering, rows)
+group("cover", covering, rows)
 rows = {
-    "contact of a chart": ("contact", "a", lambda: generate(CHARTS["backlash"], "a")),
-    "number for a chart": ("chart", 3, lambda: generate(3)),
-    "seed with a point": ("seed", 0.5, lambda: generate(CHARTS["backlash"], seed=0.5)),
-    "unknown bound": ("bounds", ..., lambda: generate(CHARTS["backlash"], bounds={"q": (0, 1)})),
-    "bound of one number": (
-        "bounds['v']", 1, lambda: generate(CHARTS["backlash"], bounds={"v": 1})
-    ),
-    "bounds the wrong way": (
-        "bounds['v']", (1, 0), lambda: generate(CHARTS["backlash"], bounds={"v": (1, 0)})
-    ),
-}  # fmt: skip
-group("generate", ParameterError, called, rows)
-rows = {"damaged counts": ("damaged.json", ..., "a.toml", "--merge", "damaged.json")}
-group("cover", TraceFileError, covering, rows)
-rows = {"scenario that is missing": ("gone.toml", ..., "gone.toml")}
-group("cover", ScenarioError, covering, rows)
-rows = {
-    "counts over the scenario": ("a.toml", ..., "a.toml", "--merge", "a.toml"),
-    "picture over the scenario": ("a.toml", ..., "a.toml", "-o", "a.toml"),
-    "counts into no folder": ("gone/c.json", ..., "a.toml", "--merge", "gone/c.json"),
+    "contact of a chart": lambda: generate(CHARTS["backlash"], "a"),
+    "number for a chart": lambda: generate(3),
+    "seed with a point": lambda: generate(CHARTS["backlash"], seed=0.5),
+    "unknown bound": lambda: generate(CHARTS["backlash"], bounds={"q": (0, 1)}),
+    "bound of one number": lambda: generate(CHARTS["backlash"], bounds={"v": 1}),
+    "bounds the wrong way": lambda: generate(CHARTS["backlash"], bounds={"v": (1, 0)}),
 }
-group("cover", OutputError, covering, rows)
+group("generate", called, rows)
+rows = {
+    "damaged counts": ("a.toml", "--merge", "damaged.json"),
+    "scenario that is missing": "gone.toml",
+    "counts over the scenario": ("a.toml", "--merge", "a.toml"),
+    "picture over the scenario": ("a.toml", "-o", "a.toml"),
+    "counts into no folder": ("a.toml", "--merge", "gone/c.json"),
+}
+group("cover", covering, rows)
 
 
 # --------------------------------------------------------------------------- cells and data sets
@@ -3675,26 +3099,26 @@ def sets(reader: Callable[[Any], Any], *last: str) -> None:
 
 
 rows = {repr(unit): (unit,) for unit in ("", "MM", "m/min", "µ", "mm s")}
-group("unit", UnitError, lambda unit: factor("velocity", unit), rows, "")
+group("unit", lambda unit: factor("velocity", unit), rows)
 HOLE = "time < 0.075 s or time > 0.085 s"
 rows = {
     "word in a selected row": ({10: "0.08,lost,1"}, "time > 0.05 s"),
-    "first of two words": ({10: "0.08,1,off", 4: "0.02,x,1"},),
+    "first of two words": {10: "0.08,1,off", 4: "0.02,x,1"},
     "word for a time": ({10: "late,1,1"}, "position > 0 mm"),
     "word for a force": ({10: "0.08,1,off"}, "not force > 3 N"),
     "time twice below a row left out": ({10: "0.08,lost,1", 15: "0.12,1,1"}, HOLE),
     "NaN below a row left out": ({10: "0.08,lost,1", 15: "0.13,1,nan"}, HOLE),
-    "unit of another column": ({2: "s,m,N"},),
-    "unit of the time": ({2: "ms,mm,N"},),
+    "unit of another column": {2: "s,m,N"},
+    "unit of the time": {2: "ms,mm,N"},
     "gap at an end": ({2: "0,,0"}, "", "interpolate"),
     "gap in time": ({7: ",1,1"}, "", "interpolate"),
     "header below the table": ({}, "", "error", 2000),
-    "header that is a row": ({2: "t,x,F"},),
-    "no header": ({1: "note"},),
+    "header that is a row": {2: "t,x,F"},
+    "no header": {1: "note"},
 }
-group("cell of a record", RecordError, cells, rows, "own.csv")
+group("cell of a record", cells, rows)
 rows = {repr(each): (each,) for each in (None, [], {}, "rig.csv", 5, {1, 2})}
-group("no data frame", RecordError, Record.from_dataframe, rows, "record 'frame'")
+group("no data frame", Record.from_dataframe, rows)
 
 
 class Frame(dict[str, list[Any]]):
@@ -3707,68 +3131,59 @@ CELLS = {"t_s": [*range(6)], "x_mm": [*range(6)], "F_N": [*range(6)]}
 FRAME, TAKEN = Frame(CELLS), arrays()
 SEVERAL = {"sigma_0": [1.0, 2.0], "F_c": 1.0}
 rows = {
-    "line of units": (Frame(CELLS | {"t_s": ["[s]", *"12345"]}),),
-    "decimal commas": (Frame(CELLS | {"x_mm": ["0,5", *"12345"]}),),
-    "word": (Frame(CELLS | {"F_N": [*range(5), "off"]}),),
+    "line of units": Frame(CELLS | {"t_s": ["[s]", *"12345"]}),
+    "decimal commas": Frame(CELLS | {"x_mm": ["0,5", *"12345"]}),
+    "word": Frame(CELLS | {"F_N": [*range(5), "off"]}),
 }
-group("data frame", RecordError, Record.from_dataframe, rows, "record 'frame'")
+group("data frame", Record.from_dataframe, rows)
+rows = {"masked entry": {"force": np.ma.masked_array(F, mask=T == 2.0)}}
+group("Record.from_arrays", lambda given: arrays(**given), rows)
 rows = {
-    "masked entry": ({"force": np.ma.masked_array(F, mask=T == 2.0)},),
+    "damper in no folder": lambda: damper("gone"),
+    "tribometer in no folder": lambda: tribometer("gone"),
+    "damper without files": lambda: damper("."),
+    "tribometer without files": lambda: tribometer("."),
+    "damper without its last file": lambda: sets(damper),
+    "damper with a damaged file": lambda: sets(damper, "0,0,0,a\n" * 9),
 }
-group("Record.from_arrays", RecordError, lambda given: arrays(**given), rows, "record 'rig'")
-rows = {
-    "damper in no folder": ("gone", ..., lambda: damper("gone")),
-    "tribometer in no folder": ("gone", ..., lambda: tribometer("gone")),
-    "damper without files": (".", ..., lambda: damper(".")),
-    "tribometer without files": (".", ..., lambda: tribometer(".")),
-    "damper without its last file": (".", ..., lambda: sets(damper)),
-    "damper with a damaged file": ("test12.csv", ..., lambda: sets(damper, "0,0,0,a\n" * 9)),
-}
-group("public data", RecordError, called, rows)
+group("public data", called, rows)
 
 rows = {
-    "list for a bank of one": ("", ..., lambda: bank(k=4e5)),
-    "column for a list": ("", ..., lambda: bank(k=np.array([[40.0], [10.0]]))),
-    "number with its unit": ("mass", "1 kg", lambda: Slider("1 kg", "t")),
-    "number with a decimal comma": ("mass", "0,5", lambda: Slider("0,5", "t")),
-    "times for the end": ("t_end", (0, 1), lambda: simulate(GIVEN, MOVING, (0, 1))),
-    "name of a scenario": ("model", "servo", lambda: simulate("servo", 1.0)),
-    "name of a chart": ("chart", "lugre", lambda: prove("lugre")),
-    "threads by their number": (
-        "executor", 4, lambda: sweep(GIVEN, MOVING, 1.0, {"v_c": [1e-6]}, executor=4)),
-    "folder for the format": ("", ..., lambda: export(GIVEN, "out", "c99")),
-    "parameter of a contact": ("", ..., lambda: sweep(DRIVEN, 1.0, {"v_s": [1e-3]})),
-    "frame for a record": ("records", FRAME, lambda: fit(FRAME, GIVEN, free=["k"])),
-    "frame for a model": ("model", FRAME, lambda: fit(TAKEN, FRAME, free=["k"])),
-    "frame for the rig": ("rig", FRAME, lambda: simulate(GIVEN, FRAME, 1.0)),
-    "model and record swapped": ("records", GIVEN, lambda: fit(GIVEN, TAKEN, free=["k"])),
-    "model to choose from": ("records", GIVEN, lambda: choose(GIVEN)),
-    "record for a rig": ("rig", TAKEN, lambda: simulate(GIVEN, TAKEN, 1.0)),
-    "class for a model": ("model", GMS, lambda: simulate(GMS, MOVING, 1.0)),
-    "rig for the end": ("t_end", MOVING, lambda: simulate(GIVEN, 1.0, MOVING)),
-    "values for the end": ("t_end", {"k": [1.0]}, lambda: sweep(GIVEN, MOVING, {"k": [1.0]}, 1.0)),
-    "frame for a file": ("path", FRAME, lambda: Record.from_csv(FRAME, time="t")),
-    "parameter for a chart's values": ("ChartModel", ..., lambda: ChartModel(k=[1.0, 2.0])),
-    "lists without their number": ("", ..., lambda: ChartModel(CHARTS["dahl"], SEVERAL)),
-}  # fmt: skip
-group("call that is meant otherwise", ParameterError, called, rows)
-rows = {
-    "motion for its velocity": ("signal", ..., lambda: Prescribed(arrays().motion())),
+    "list for a bank of one": lambda: bank(k=4e5),
+    "column for a list": lambda: bank(k=np.array([[40.0], [10.0]])),
+    "number with its unit": lambda: Slider("1 kg", "t"),
+    "number with a decimal comma": lambda: Slider("0,5", "t"),
+    "times for the end": lambda: simulate(GIVEN, MOVING, (0, 1)),
+    "name of a scenario": lambda: simulate("servo", 1.0),
+    "name of a chart": lambda: prove("lugre"),
+    "threads by their number": lambda: sweep(GIVEN, MOVING, 1.0, {"v_c": [1e-6]}, executor=4),
+    "folder for the format": lambda: export(GIVEN, "out", "c99"),
+    "parameter of a contact": lambda: sweep(DRIVEN, 1.0, {"v_s": [1e-3]}),
+    "frame for a record": lambda: fit(FRAME, GIVEN, free=["k"]),
+    "frame for a model": lambda: fit(TAKEN, FRAME, free=["k"]),
+    "frame for the rig": lambda: simulate(GIVEN, FRAME, 1.0),
+    "model and record swapped": lambda: fit(GIVEN, TAKEN, free=["k"]),
+    "model to choose from": lambda: choose(GIVEN),
+    "record for a rig": lambda: simulate(GIVEN, TAKEN, 1.0),
+    "class for a model": lambda: simulate(GMS, MOVING, 1.0),
+    "rig for the end": lambda: simulate(GIVEN, 1.0, MOVING),
+    "values for the end": lambda: sweep(GIVEN, MOVING, {"k": [1.0]}, 1.0),
+    "frame for a file": lambda: Record.from_csv(FRAME, time="t"),
+    "parameter for a chart's values": lambda: ChartModel(k=[1.0, 2.0]),
+    "lists without their number": lambda: ChartModel(CHARTS["dahl"], SEVERAL),
 }
-group("signal that is meant otherwise", SignalError, called, rows)
-rows = {"decimal comma": ("signal, column 3", ..., lambda: Prescribed("0,001*sin(t)"))}
-group("signal that is meant otherwise", ExpressionError, called, rows)
-rows = {"date for a time": ("own.csv", ..., {3: "2024-01-01 00:00:01,1,1"})}
-group("cell that is meant otherwise", RecordError, cells, rows)
-rows = {"folder": (".", ..., ".")}
-group(
-    "checkpoint",
-    CheckpointError,
-    lambda path: simulate(GIVEN, MOVING, 1.0, checkpoint=path),
-    rows,
-)
-rows = {"scenario": ("own.toml", ..., OPEN_LOOP.encode())}
-group("file that is another", ChartError, chart_bytes, rows)
+group("call that is meant otherwise", called, rows)
+rows = {
+    "motion for its velocity": lambda: Prescribed(arrays().motion()),
+    "decimal comma": lambda: Prescribed("0,001*sin(t)"),
+}
+group("signal that is meant otherwise", called, rows)
+rows = {"date for a time": {3: "2024-01-01 00:00:01,1,1"}}
+group("cell that is meant otherwise", cells, rows)
+rows = {"folder": "."}
+group("checkpoint", lambda path: simulate(GIVEN, MOVING, 1.0, checkpoint=path), rows)
+rows = {"scenario": OPEN_LOOP.encode()}
+group("file that is another", chart_bytes, rows)
 
 
 def wrong_place(*words: str) -> None:
@@ -3779,13 +3194,12 @@ def wrong_place(*words: str) -> None:
     verb(*words)
 
 
-rows = {"folder for a scenario": ("in", ..., "run", "in")}
-group("wrong place", ScenarioError, wrong_place, rows)
 rows = {
-    "picture for the folder of pictures": ("one.png", ..., "plot", "run.npz", "-o", "one.png"),
-    "file for the folder of a run": ("a.csv", ..., "run", "in/a.toml", "-o", "a.csv"),
+    "folder for a scenario": ("run", "in"),
+    "picture for the folder of pictures": ("plot", "run.npz", "-o", "one.png"),
+    "file for the folder of a run": ("run", "in/a.toml", "-o", "a.csv"),
 }
-group("wrong place", OutputError, wrong_place, rows)
+group("wrong place", wrong_place, rows)
 
 
 if __name__ == "__main__":
