@@ -26,8 +26,10 @@ import numpy as np
 import scipy.integrate
 from scipy.integrate import RK45
 from transitions import Machine
+from transitions import State as MachineState
 from transitions.extensions.asyncio import AsyncMachine
 from transitions.extensions.nesting import HierarchicalMachine
+from transitions.extensions.states import Error, Timeout, Volatile, add_state_features
 
 from gms_fsm import (
     GMS,
@@ -94,6 +96,7 @@ from gms_fsm.systems.system import with_model
 from gms_fsm.traces.monitors import Chattering, CoverageMonitor, Passivity
 from tests import older_files, own_files, systems_cases
 from tests.corpus import HEALS, run, trace
+from tests.exporters.charts_to_export import FOREIGN, TEXTS, edited_export, foreign, one_edge, small
 from tests.helpers import FIG4_SINE, ROOT, pulled_mass, stick_slip
 from tests.inspection.sessions import a_system, fig4, locked
 from tests.scenario_files import MEASURED, OPEN_LOOP, changed, sine_table, table
@@ -1135,6 +1138,82 @@ rows = {
 group("state of a document", inside, rows)
 rows = {"words": "<datamodel><data id='n' expr='\"red\"'/></datamodel>"}
 group("data of a document", inside, rows)
+STATE, ASSIGN = '<state id="stick">', '<assign location="z" expr="-Math.abs(z)"/>'
+DATA, LATER = '<data id="z" expr="0"/>', '<send event="q" delay="1s"/>'
+rows = {
+    "no XML": (FOREIGN, "<scxml"),
+    "no state": (FOREIGN, '<scxml xmlns="http://www.w3.org/2005/07/scxml"/>'),
+    "another root": (FOREIGN, "<html/>"),
+    "parallel states": (STATE, f"<parallel></parallel>{STATE}"),
+    "script": (STATE, f"<script></script>{STATE}"),
+    "history": (STATE, f"{STATE}<history/>"),
+    "another machine": (STATE, f"{STATE}<invoke/>"),
+    "state without a name": (STATE, "<state/>" + STATE),
+    "unknown initial state": ('initial="stick"', 'initial="stuck"'),
+    "two initial states": ('initial="stick"', 'initial="stick slip"'),
+    "late binding": (
+        'initial="stick">',
+        'initial="stick" binding="late"><state id="q"><datamodel><data id="i"/>'
+        "</datamodel></state>",
+    ),
+    "state twice": (STATE, '<final id="stick"/>' + STATE),
+    "log at the start": (
+        STATE,
+        f'<state id="a"><initial><transition target="b"><log/></transition></initial>'
+        f'<state id="b"/></state>{STATE}',
+    ),
+    "nine levels": (
+        STATE,
+        "".join(f'<state id="{c}">' for c in "abcdefghi") + "</state>" * 9 + STATE,
+    ),
+    "data when it is done": (STATE, '<final id="e"><donedata/></final>' + STATE),
+    "data of a file": (DATA, '<data id="z" src="z.json"/>'),
+    "data that are a list": (DATA, '<data id="q">[1, 2]</data>'),
+    "data that begin as an input": (DATA, '<data id="z" expr="2 * v"/>'),
+    "data that are no number": (DATA, '<data id="z" expr="1 / 0"/>'),
+    "unknown target": ('target="slip"/>', 'target="nowhere"/>'),
+    "no target, with entry": ("</onentry>", '</onentry><transition cond="v &gt; 1"/>'),
+    "no target, beside a time": (
+        '<transition target="slip"/>',
+        '<transition target="slip" cond="after(3)"/><transition cond="z &gt; 1"/>',
+    ),
+    "timer beside another way out": (
+        STATE,
+        f'{STATE}<onentry>{LATER}</onentry><transition event="q" target="slip"/>',
+    ),
+    "timer with a condition": (
+        STATE,
+        f'{STATE}<onentry>{LATER}</onentry><onexit><cancel sendid="q"/></onexit>'
+        '<transition event="q" target="slip" cond="z &gt; 1"/>',
+    ),
+    "event without a guard": ('cond="!(v &gt;= 1 || z &gt; 9)"', ""),
+    "message of an edge": (ASSIGN, '<send event="x"/>'),
+    "case": (ASSIGN, "<if cond='1'/>"),
+    "element of another language": (ASSIGN, '<run xmlns="urn:mine"/>'),
+    "no value assigned": ('expr="-Math.abs(z)"', ""),
+    "assigned twice": ("</transition>", '<assign location="z" expr="0"/></transition>'),
+    "assigned to no variable": ('location="z" expr="-', 'location="q" expr="-'),
+    **{
+        f"guard {cond}": ("z &lt; -1", cond)
+        for cond in ("In('slip')", "Math.cbrt(z) &gt; 1", "_event.data.z", "v &gt; 'a'")
+    },
+}
+group("document of another tool", foreign, rows)
+rows = {
+    "guard": ('cond="v &lt; 0.0"', 'cond="v &lt; 1.0"'),
+    "no guard": ('cond="v &lt; 0.0" ', ""),
+    "action": ('expr="-(F_c', 'expr="(F_c'),
+    "entry": ('expr="f / (1', 'expr="f / (2'),
+    "order": ('gms:order="1"', 'gms:order="0"'),
+}
+group("document changed beside its texts", lambda *by: Chart.from_scxml(edited_export(*by)), rows)
+rows = {
+    "missing": ("none.scxml", {}),
+    "number": (5, {}),
+    "callbacks": ("none.scxml", {"callbacks": {"look": {}}}),
+    "argument": ("none.scxml", {"flow": {}}),
+}
+group("path of a document", lambda path, texts: Chart.from_scxml(path, **texts), rows)
 
 
 def machine(kind: Callable[..., Any], second: Any, callbacks: Any, more: Mapping[str, Any]) -> None:
@@ -1159,6 +1238,92 @@ rows = {
     "mapping for a condition": ({"is_hot": {"n": "1"}}, {"conditions": "is_hot"}),
 }
 group("function of a machine", partial(machine, Machine, "b"), rows)
+
+
+class Watching:
+    """A model whose method transitions calls by its name."""
+
+    def on_enter_slip(self) -> None:
+        """Do nothing."""
+
+
+def featured(feature: type, **state: object) -> Machine:
+    """Return a machine with a feature of transitions, and with one state that has more."""
+    kind = add_state_features(feature)(type("Featured", (Machine,), {}))
+    return kind(states=["a", {"name": "b", **state}], initial="a", auto_transitions=False)
+
+
+def read_from(made: Callable[[], object], **texts: object) -> Chart:
+    """Read a chart from a machine."""
+    return Chart.from_transitions(made(), **{**TEXTS, **texts})
+
+
+def slipping(**more: Any) -> Callable[[], Machine]:
+    """Return how a machine is made whose second state has more."""
+    return lambda: small(states=["stick", MachineState("slip", **more)])
+
+
+OF_MACHINES = "before_state_change after_state_change prepare_event finalize_event on_exception"
+THREE = [["slips", "stick", "slip"], ["sticks", "slip", "stick"], ["go", "slip", "stick"]]
+INSIDE = {"name": "slip", "children": "b", "initial": "c"}
+TWO = [["slips", "stick", "slip"], ["sticks", "stick", "stick"]]
+rows = {
+    "no machine": lambda: "a machine",
+    **{
+        f"callback {each}": partial(small, **{each: "look"})
+        for each in (*OF_MACHINES.split(), "on_final")
+    },
+    "no initial state": lambda: small(initial=None, model=None),
+    **{f"callback on_{each}": slipping(**{f"on_{each}": "look"}) for each in ("enter", "exit")},
+    "method of the model": lambda: small(model=Watching()),
+    "timeout": lambda: featured(Timeout, timeout=2, on_timeout="x"),
+    "volatile state": lambda: featured(Volatile),
+    "error state": lambda: featured(Error),
+    **{
+        f"callback {each} of an edge": partial(one_edge, **{each: "look"})
+        for each in ("before", "after", "prepare")
+    },
+    "no guard of one edge": lambda: small(transitions=THREE),
+    "unknown target": lambda: one_edge(dest="nowhere"),
+    "unknown source": lambda: one_edge(source="nowhere"),
+    "unknown initial state inside": lambda: HierarchicalMachine(
+        states=["stick", INSIDE], initial="stick", transitions=TWO
+    ),
+}
+group("machine of another tool", read_from, rows)
+rows = {
+    "before every condition": {"look": {"n": "1"}},
+    "assigned twice": {"one": {"n": "1"}, "two": {"n": "2"}},
+}
+group(
+    "callbacks of a machine",
+    lambda given: read_from(
+        partial(small, prepare_event="look")
+        if "look" in given
+        else slipping(on_enter=["one", "two"]),
+        callbacks=given,
+    ),
+    rows,
+)
+rows = {
+    "unknown argument": {"gards": {}},
+    "guard of no edge": {"guards": {"slip": "v > 1"}},
+    "text for the guards": {"guards": "v > 1"},
+    "actions of no edge": {"actions": {"x": {}}},
+    "list of actions": {"actions": [1]},
+    "flow of no state": {"flows": {"stuck": {}}},
+    "number for the entries": {"entry": 3},
+    "text for the locked states": {"locked": "stick"},
+    "locked state that is none": {"locked": ["stuck"]},
+    "text for the parameters": {"parameters": "k"},
+    "parameter without a name": {"parameters": [{"unit": "N"}]},
+    "number for the variables": {"variables": 5},
+    "number for the initial values": {"initial": 5},
+    "parameter with an unknown field": {"parameters": [{"name": "k", "size": 1}]},
+    "no force": {"outputs": {}},
+    "guard that cannot be parsed": {"guards": {"slips": "w > 1", "sticks": "True"}},
+}
+group("texts beside a machine", lambda texts: read_from(small, **texts), rows)
 STICK = State("stick", flow={"z": "v"})
 SLIP = State("slip", flow={"z": "C * (sgn(v) - z / s)"})
 GO = Transition("go", "stick", "slip", guard="z >= s and v > v_c")

@@ -8,6 +8,7 @@ from gms_fsm.errors import MissingExtraError
 from tests.refusals import REFUSALS, approved, refused, told
 
 INPUTS = {"a.toml", "own.csv", "in/a.toml", "in/own.csv", "own.toml", "pulled.toml", "pair.toml"}
+INPUTS |= {"own.scxml", "file.scxml", "README-file-scxml.md", ".gms-fsm-files.json"}
 INPUTS |= {f"test{number:02d}.csv" for number in range(13)}
 TRACES = {"run.npz", ".npz", "run.txt", "run.csv", "run.transitions.csv", "out/own/trace.npz"}
 SESSIONS = {"s.json", "odd.json"}

@@ -1,4 +1,4 @@
-"""The included charts that can be exported alone, with slow records on which they switch."""
+"""Charts to export and read: the included ones, with slow records; those of other tools."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from gms_fsm import Chart
+from transitions import Machine
+
+from gms_fsm import Chart, export
+from gms_fsm.charts import CHARTS
 from gms_fsm.charts.registry import registered
 from gms_fsm.systems.models import ChartModel, demonstration
-
-__all__ = ["MODELS", "SLOW", "imported", "model", "rebuilt"]
 
 SLOW = "0.015 * sin(2 * pi * t / 5)"  # m/s: with steps of 1 ms Euler's method is stable for all
 MODELS: Mapping[str, tuple[str, str]] = {
@@ -60,3 +61,52 @@ def rebuilt(file: Any, machine: Any) -> Chart:
         contact_outputs=file.CONTACT_OUTPUTS,
         initial=file.INITIAL,
     )
+
+
+# --------------------------------------------------------------------------- of other tools
+FOREIGN = """\
+<scxml xmlns="http://www.w3.org/2005/07/scxml" version="1.0" name="own" initial="stick">
+  <datamodel><data id="z" expr="0"/></datamodel>
+  <state id="slip">
+    <onentry><assign location="z" expr="Math.min(z, 1)"/></onentry>
+    <transition event="sticks" target="stick" cond="!(v &gt;= 1 || z &gt; 9)"/>
+  </state>
+  <state id="stick">
+    <transition event="slips" target="slip" cond="z &gt; 1 &amp;&amp; Math.sign(v) &gt; 0">
+      <assign location="z" expr="-Math.abs(z)"/>
+    </transition>
+    <transition target="slip" cond="z &lt; -1"/>
+    <transition target="slip"/>
+  </state>
+</scxml>
+"""
+TEXTS: dict[str, Any] = {"outputs": {"F": "v"}, "guards": {"slips": "v > 1", "sticks": "v < 1"}}
+
+
+def foreign(old: str = "", new: str = "", folder: Path = Path(), **texts: Any) -> Chart:
+    """Return the chart of the document, changed."""
+    assert old in FOREIGN
+    path = folder / "own.scxml"
+    path.write_text(FOREIGN.replace(old, new) if old else FOREIGN, encoding="utf-8")
+    beside: Any = {"variables": ("z",), "flows": {"stick": {"z": "v"}}, "outputs": {"F": "z"}}
+    return Chart.from_scxml(path, **{**beside, **texts})
+
+
+def edited_export(old: str, new: str, folder: Path = Path()) -> Path:
+    """Return an exported document that somebody has changed."""
+    path, *_ = export(CHARTS["seven-parameter"], "scxml", folder, name="file")
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
+def small(**more: Any) -> Machine:
+    """Return a machine of two states."""
+    states, edges = ["stick", "slip"], [["slips", "stick", "slip"], ["sticks", "slip", "stick"]]
+    return Machine(**{"states": states, "initial": "stick", "transitions": edges, **more})
+
+
+def one_edge(**more: Any) -> Machine:
+    """Return it with one edge, which has more."""
+    return small(transitions=[{"trigger": "slips", "source": "stick", "dest": "slip", **more}])
