@@ -30,7 +30,7 @@ def test_scenario_files(data: bytes) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=250, deadline=None, derandomize=True)
 @given(st.binary(max_size=200))
 def test_trace_files(data: bytes) -> None:
     fuzz.one_trace_file(data)

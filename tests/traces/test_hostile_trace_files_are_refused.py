@@ -1,6 +1,7 @@
-"""Whatever bytes a trace file has, it is refused, or can be read; nothing is executed.
+"""A trace file that is hostile is refused, costs little, and executes nothing.
 
-What is refused by one wrong value is in `tests/refusals.py`. Each case here was found by fuzzing.
+What is refused by one wrong value is in `tests/refusals.py`; damaged and random bytes are tried by
+`tests.soak.fuzz`. Each case here was found by fuzzing.
 """
 
 from __future__ import annotations
@@ -8,9 +9,7 @@ from __future__ import annotations
 import io
 import json
 import pickle
-import tempfile
 import tracemalloc
-import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -18,8 +17,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gms_fsm import Prescribed, Trace, simulate
 from gms_fsm.errors import TraceFileError
@@ -60,85 +57,6 @@ def claims(kind: str, *shape: int) -> bytes:
         head, {"descr": kind, "fortran_order": False, "shape": shape}
     )
     return head.getvalue()
-
-
-# --------------------------------------------------------------------------- damaged files
-COLUMNS = ("t", "microstep", "x", "v", "z", "states", "s", "F", "F_elements", "dz")
-
-
-def loads_or_is_refused(files: dict[str, bytes]) -> None:
-    """Load; only `TraceFileError` may be raised, and a loaded trace must be readable."""
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        warnings.simplefilter("error")
-        for name, content in files.items():
-            (Path(folder) / name).write_bytes(content)
-        path = Path(folder) / next(name for name in files if "transitions" not in name)
-        try:
-            trace = Trace.load(path)
-        except TraceFileError:
-            return
-        for name in COLUMNS:
-            getattr(trace, name)
-        trace.columns()
-        repr(trace)
-
-
-MUTATIONS = st.lists(
-    st.tuples(
-        st.sampled_from(["flip", "cut", "insert", "drop", "zero"]),
-        st.floats(0, 1, exclude_max=True),
-        st.integers(1, 255),
-    ),
-    min_size=1,
-    max_size=4,
-)
-
-
-def damaged(content: bytes, changes: list[tuple[str, float, int]]) -> bytes:
-    data = bytearray(content)
-    for kind, place, amount in changes:
-        i = int(place * len(data))
-        if kind == "flip" and data:
-            data[i] ^= amount
-        elif kind == "cut":
-            del data[i:]
-        elif kind == "insert":
-            data[i:i] = bytes([amount]) * 3
-        elif kind == "drop":
-            del data[i : i + amount]
-        elif kind == "zero":
-            data[i : i + amount] = bytes(len(data[i : i + amount]))
-    return bytes(data)
-
-
-@pytest.mark.slow
-@settings(max_examples=120, deadline=None)
-@given(MUTATIONS, st.sampled_from(["run.npz", "run.csv", "run.transitions.csv"]))
-def test_a_damaged_file_loads_or_is_rejected(
-    changes: list[tuple[str, float, int]], name: str
-) -> None:
-    files = dict(saved(".npz" if name == "run.npz" else ".csv"))
-    files[name] = damaged(files[name], changes)
-    loads_or_is_refused(files)
-
-
-@pytest.mark.slow
-@settings(max_examples=60, deadline=None)
-@given(MUTATIONS, st.sampled_from(["rows_t", "rows_y", "rows_mode", "log_edge", "header"]))
-def test_a_damaged_array_in_a_valid_archive_loads_or_is_rejected(
-    changes: list[tuple[str, float, int]], name: str
-) -> None:
-    whole = zipfile.ZipFile(io.BytesIO(ARCHIVE)).read(f"{name}.npy")
-    out = io.BytesIO()
-    repacked(out, name, lambda file: file.write(damaged(whole, changes)))
-    loads_or_is_refused({"run.npz": out.getvalue()})
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.binary(max_size=300), st.sampled_from([b"", b"PK\x03\x04", b"\x93NUMPY\x01\x00", b"# {"]))
-def test_random_bytes_are_rejected(content: bytes, start: bytes) -> None:
-    for name in ("run.npz", "run.csv"):
-        loads_or_is_refused({name: start + content})
 
 
 # --------------------------------------------------------------------------- hostile files
