@@ -19,8 +19,9 @@ from gms_fsm import GMS, ChartModel, Prescribed, PulledSlider, Slider, Trace, si
 from gms_fsm.errors import GMSError
 from gms_fsm.session.explain import explain, explain_state, values_at
 from gms_fsm.traces.failures import SimulationError
-from tests.corpus import ENGINES
-from tests.helpers import FASTEST, FIG4_SINE, other_parts, stick_slip
+from tests.corpus import ENGINES, Run
+from tests.helpers import FASTEST, other_parts
+from tests.laws.test_mirrored_runs import assert_mirrored, mirror_of
 from tests.strategies import banks, chart_models, options, ramps, rigs, rounded
 
 pytestmark = pytest.mark.slow
@@ -177,49 +178,20 @@ def test_machine_code_agrees_on_random_charts(
 
 
 # --------------------------------------------------------------------------- symmetry
-MIRRORED = {
-    "break_away_forward": "break_away_backward",
-    "break_away_backward": "break_away_forward",
-    "arrest": "arrest",
-}
-
-
-def mirrored(model: GMS, one: Any, other: Any, t_end: float, given: dict[str, Any]) -> Trace:
-    """Assert that (v, z, F) -> (-v, -z, -F) to the bit."""
-    a, end = attempt(model, one, t_end, **given)
-    b, end_too = attempt(model, other, t_end, **given)
-    assert end == end_too
-    np.testing.assert_array_equal(a.t, b.t)
-    np.testing.assert_array_equal(a.states, b.states)
-    for name in ("x", "v", "z", "F", "F_elements"):
-        np.testing.assert_array_equal(getattr(a, name), -getattr(b, name), err_msg=name)
-    assert [MIRRORED[edge] for edge in a.transitions.edge] == b.transitions.edge.tolist()
-    return a
-
-
 @hard(20)
 @given(banks("signed"), ramps(jumps=True), options(), st.integers(0, 2))
 def test_under_the_signed_law_the_mirrored_signal_gives_the_mirrored_run(
     model: GMS, corners: Any, given: dict[str, Any], kind: int
 ) -> None:
     """For every method and step."""
-    mirror, speed = [(t, -value) for t, value in corners], corners[0][1]
-    one, other = [
-        (Prescribed(corners), Prescribed(mirror)),
-        (Slider(0.1, corners), Slider(0.1, mirror)),
-        (PulledSlider(1.0, 2.0, speed), PulledSlider(1.0, 2.0, -speed)),
-    ][kind]
-    fired(mirrored(model, one, other, 3.0, given))
-
-
-@pytest.mark.parametrize("signal", [FIG4_SINE, "0.6*sin(t) + 0.3*sin(2.7*t)", "0.05*t - 0.3"])
-def test_so_do_formulas(signal: str) -> None:
-    """Eq. (1) as printed, the published law, breaks the symmetry by decimetres."""
-    one, other = Prescribed(signal), Prescribed(f"-({signal})")
-    assert len(mirrored(stick_slip("signed"), one, other, 12.0, {}).transitions) > 0
-    if signal == FIG4_SINE:
-        a, b = (simulate(stick_slip("published"), rig, 40.0) for rig in (one, other))
-        assert np.abs(a.z[-1] + b.z[-1]).max() > 0.1
+    rigs = (Prescribed(corners), Slider(0.1, corners), PulledSlider(1.0, 2.0, corners[0][1]))
+    one = Run((model, rigs[kind]), 3.0, {**given, "max_steps": 30_000})
+    (a, said), (b, too) = one.outcome(), mirror_of(one).outcome()
+    assert said.partition(":")[0] == too.partition(":")[0]
+    assert a is not None
+    assert b is not None
+    assert_mirrored(a, b)
+    fired(a)
 
 
 # --------------------------------------------------------------------------- wrong arguments

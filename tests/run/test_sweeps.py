@@ -15,7 +15,6 @@ import tracemalloc
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,6 @@ import pytest
 from gms_fsm import (
     Chart,
     ChartModel,
-    GMSParameters,
     ParameterError,
     Prescribed,
     State,
@@ -39,9 +37,9 @@ from gms_fsm import (
 from gms_fsm.charts import gms_element
 from gms_fsm.errors import SignalError, TraceFileError
 from gms_fsm.run.sweep import _interrupts_deferred
-from gms_fsm.systems.models import GMS, parameter_names, with_values
+from gms_fsm.systems.models import parameter_names, with_values
 from tests.corpus import ENGINES, LUGRE, RECORD
-from tests.helpers import FASTEST, bank, pulled_mass, stick_slip
+from tests.helpers import FASTEST, bank, event_sequence, matrix, pulled_mass, stick_slip
 from tests.laws.test_a_sweep_is_many_runs import same
 from tests.systems_cases import two_blocks
 
@@ -81,19 +79,6 @@ def test_one_number_applies_to_all_elements_and_what_is_given_is_kept() -> None:
     assert one.parameters["k"].shape == (2,)
     np.testing.assert_array_equal(other.parameters["k"], given)
     assert other.parameters["F_s"].dtype == np.float64
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-def test_an_exponent_of_two_among_others_is_a_run_like_them(engine: str) -> None:
-    """It gives another text than other exponents, and so other machine code."""
-    delta = np.where(np.arange(130) % 3, 1.5, 2.0)  # several runs per task
-    model, rig = stick_slip("signed"), Prescribed("0.2")
-    result = sweep(model, rig, 2.5, {"delta": delta}, engine=engine, progress=False)
-    assert set(result.outcome) == {"ok"}
-    for value in (1.5, 2.0):
-        alone = simulate(with_values(model, {"delta": value}), rig, 2.5, engine=engine)
-        assert set(result.F[delta == value]) == {alone.F[-1]}
 
 
 @pytest.mark.slow
@@ -394,63 +379,72 @@ def test_edges_and_columns_have_the_contact_s_name(tmp_path: Path) -> None:
 
 
 # --------------------------------------------------------------------------- many
-@pytest.mark.matrix
-@pytest.mark.slow
-def test_more_runs_than_a_task_holds_and_more_firings_than_a_column() -> None:
-    """Buffers are reused by the next run of a task; nothing of the previous run shows."""
-    model, rig = pulled_mass()[0], Prescribed("0.3*sin(20*t)")
-    level = np.resize([1.0, 40.0, 2.0], 200)  # hundreds of firings, then few
-    result = sweep(model, rig, 10.0, {"weights": level / 4 / 40}, t_eval=[0, 5, 9], engine=FASTEST)
-    assert (result.outcome == "ok").all()
-    for run in (0, 1, 2):
-        alike = np.flatnonzero(level == level[run])
-        one = simulate(with_values(model, {"weights": level[run] / 4 / 40}), rig, 10.0)
-        assert (result.transition_count[alike] == len(one.transitions)).all()
-        for name in ("F", "x", "v"):
-            assert (getattr(result, name)[alike] == getattr(one, name)[-1]).all()
-        for other in alike[1:]:
-            np.testing.assert_array_equal(result.rows["F"][other], result.rows["F"][run])
-    counts = result.transition_count
-    assert counts[0] > 400
-    assert 0 <= counts[1] < counts[2] < counts[0]
-
-
-def test_the_next_run_of_a_task_does_not_write_into_the_rows_of_the_one_before() -> None:
-    (model, rig), times = pulled_mass(), np.linspace(0.0, 5.0, 501)
-    k = model.parameters.k * np.linspace(0.8, 1.2, 130)[:, None]  # two runs in each task
-    found = sweep(model, rig, 5.0, {"k": k}, t_eval=times, engine=FASTEST)
-    for run in (0, 1, 2, 3, 129):
-        parameters: GMSParameters = model.parameters.replaced(k=k[run])
-        alone = simulate(GMS(parameters, law="signed"), rig, 5.0, t_eval=times, engine=FASTEST)
-        np.testing.assert_array_equal(found.rows["z"][run], alone.z)
-
-
-@pytest.mark.every(2)
-@pytest.mark.slow
-@pytest.mark.parametrize("n", [4, 100])
-def test_many_runs_at_once_are_those_alone(n: int) -> None:
+def _many(n: int = 4) -> tuple[Any, ...]:
     """A bank of 100 elements does not fit into the block that is copied between two runs."""
-    model, rig = bank(n), Prescribed("2 * sin(4 * t)")
-    F_s = np.linspace(1.1, 2.0, 130)  # two runs in each task
-    found = sweep(model, rig, 2.0, {"F_s": F_s}, engine=FASTEST)
-    for run in (0, 1, 2, 129):
-        curve = replace(model.stribeck, F_s=float(F_s[run]))
-        parameters: GMSParameters = model.parameters.replaced(stribeck=curve)
-        alone = simulate(GMS(parameters, law=model.law), rig, 2.0, engine=FASTEST)
-        np.testing.assert_array_equal(found.z[run], alone.z[-1])
-        assert found.F[run] == alone.F[-1]
-        assert found.transition_count[run] == len(alone.transitions) > 0
+    return bank(n), Prescribed("2 * sin(4 * t)"), 2.0, {"F_s": np.linspace(1.1, 2.0, 130)}, None
+
+
+def _one_by_one() -> tuple[Any, ...]:
+    """Whether F_s is F_c is looked at."""
+    F = np.linspace(1.0, 1.5, 130)
+    values = {"F_s": F, "F_c": F, "sigma_2": np.linspace(0.0, 9.0, 130)}
+    return *pulled_mass(), 0.3, values, None
+
+
+EXPONENT = "an exponent of two among others"
+# Model, rig, end, parameters, rows: with 130 and more runs a task has several, which share memory.
+LONG: dict[str, Callable[[], tuple[Any, ...]]] = {
+    "firings by the hundred, then few": lambda: (
+        pulled_mass()[0],
+        Prescribed("0.3*sin(20*t)"),
+        10.0,
+        {"weights": np.resize([1.0, 40.0, 2.0], 200) / 160},
+        [0, 5, 10],
+    ),
+    "many rows": lambda: (
+        *pulled_mass(),
+        5.0,
+        {"k": K * np.linspace(0.8, 1.2, 130)[:, None]},
+        np.linspace(0.0, 5.0, 501),
+    ),
+    EXPONENT: lambda: (  # another text, and so other machine code
+        stick_slip("signed"),
+        Prescribed("0.2"),
+        2.5,
+        {"delta": np.where(np.arange(130) % 3, 1.5, 2.0)},
+        None,
+    ),
+    "all at once": _many,
+    "a hundred elements": lambda: _many(100),
+    "one by one": _one_by_one,
+}
 
 
 @pytest.mark.slow
-def test_runs_that_go_one_by_one_end_with_their_own_force() -> None:
-    model, rig = pulled_mass()
-    force = np.linspace(1.0, 1.5, 130)  # F_s = F_c is looked at; two runs in each task
-    values = {"F_s": force, "F_c": force, "sigma_2": np.linspace(0.0, 9.0, 130)}
-    found = sweep(model, rig, 0.3, values, engine=FASTEST)
-    for run in (0, 1, 3, 129):
-        own = with_values(model, {name: float(each[run]) for name, each in values.items()})
-        assert found.F[run] == simulate(own, rig, 0.3, engine=FASTEST).F[-1]
+@pytest.mark.parametrize(
+    ("name", "engine"),
+    matrix(
+        [(name, FASTEST) for name in LONG] + [(EXPONENT, each) for each in ENGINES[:2]],
+        [(name, FASTEST) for name in LONG if "hundred" not in name] + [(EXPONENT, "ifelse")],
+    ),
+)
+def test_of_a_task_nothing_of_one_run_is_in_the_next(name: str, engine: str) -> None:
+    model, rig, t_end, values, rows = LONG[name]()
+    how: dict[str, Any] = {"t_eval": rows, "engine": engine}
+    found = sweep(model, rig, t_end, values, **how)
+    assert (found.outcome == "ok").all()
+    for run in (0, 1, 2, 3, 129):
+        own = with_values(model, {key: each[run] for key, each in values.items()})
+        alone = simulate(own, rig, t_end, **how)
+        assert found.sequence(run) == event_sequence(alone)
+        for column in ("x", "v", "F", "z"):
+            its = getattr(alone, column)
+            np.testing.assert_array_equal(getattr(found, column)[run], its[-1], column)
+            if rows is not None:
+                np.testing.assert_array_equal(found.rows[column][run], its, column)
+    counts = found.transition_count
+    assert name == "one by one" or counts.max() > 0
+    assert name != "firings by the hundred, then few" or counts[0] > 400
 
 
 @pytest.mark.matrix
