@@ -53,6 +53,7 @@ from gms_fsm.traces.failures import (
     StepLimitError,
     StepSizeError,
 )
+from integrators.elementary import sin
 from tests import supervisor_cases, systems_cases
 from tests.helpers import (
     CURVE,
@@ -697,6 +698,11 @@ SYSTEM_RUNS: dict[str, Maker] = {
         (belt(),), 12.0, {"initial": {"q2": 0.2, "pad.states": ["backward"]}}
     ),
     "cradle with pads": _case(functools.partial(systems_cases.cradle, pads=True)),
+    "hit, by step": lambda: Run(
+        (systems_cases.hit(),),
+        0.5,
+        {"initial": {"v_a": 1.0}, "events": "step", "method": "rk4", "step": 0.01},
+    ),
     **{f"random system {k}": _random(k) for k in range(RANDOM_SHAPES - 1)},  # the last one stops
 }
 
@@ -737,7 +743,8 @@ BOTH_WAYS = _broken(
     Transition("arrest", "slip", "stick", guard="abs(v) <= v_c and abs(z) < 10 * s"),
 )
 SELF_LOOP = _broken(Transition("again", "stick", "stick", guard="z >= s"))
-RECORD = np.linspace(0, 35, 701), 0.2 * np.sin(2 * np.pi * np.linspace(0, 35, 701) / 20)
+TIMES = np.linspace(0, 35, 701)
+RECORD = TIMES, np.array([0.2 * sin(2 * np.pi * t / 20) for t in TIMES.tolist()])
 _UP = {"initial": {"z": [0.1, 1.0]}}
 _RK4 = {"method": "rk4", "step": 0.01}
 _BY_STEP = {"events": "step", "max_step": 0.05}

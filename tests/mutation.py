@@ -66,6 +66,31 @@ NEAR = {  # module: its tests, those that detect most first
         "integrators/test_steps_and_stops",
         *PHYSICS,
     ],
+    "integrators/loop.py": [
+        "laws/test_the_bits_are_the_approved_ones",
+        "laws/test_locked_contacts_do_not_move",
+        "run/test_failures_keep_what_was_computed",
+        "run/test_every_run_ends",
+        "systems/test_locks_and_impacts",
+        "systems/test_times_and_events",
+        "run/test_system_state",
+        "integrators/test_steps_and_stops",
+        "physics/test_sliding_follows_filippov",
+        *PHYSICS,
+    ],
+    "integrators/sliding.py": [
+        "laws/test_the_bits_are_the_approved_ones",
+        "physics/test_sliding_follows_filippov",
+        "integrators/test_steps_and_stops",
+        *PHYSICS,
+    ],
+    "integrators/step_size.py": [
+        "laws/test_the_bits_are_the_approved_ones",
+        "integrators/test_steps_and_stops",
+        "lowering/test_tolerances_come_from_the_model",
+        *PHYSICS,
+        "integrators/test_convergence_orders",
+    ],
 }
 LANGUAGE = [
     "tree", "functions", "normal", "_read", "_fold", "_powers", "_print", "_evaluate",

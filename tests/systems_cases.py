@@ -243,6 +243,15 @@ def cradle(*, pads: bool) -> Case:
     return Case(system, 0.1006, start)
 
 
+def hit() -> System:
+    """A ball that hits another, which friction stops within a hundredth of a second."""
+    contacts = (
+        stop("hit", "v_a - v_b", x_s=0.1, e=0.5, v_r=1e-6),
+        pad("pad", "v_b", 1e3, 1.5e3),
+    )
+    return System("hit", bodies=(mass("a", 1.0), mass("b", 3.0)), contacts=contacts)
+
+
 CASES = {
     each.__name__: each
     for each in (

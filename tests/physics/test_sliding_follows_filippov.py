@@ -323,6 +323,9 @@ def test_it_leaves_by_its_edge_however_the_guards_are_written(guards: tuple[str,
     assert log.edge.tolist() == ["rise", "fall"]
     assert log.t[1] == trace.sliding[0].t_end == pytest.approx(LEAVES, abs=1e-12)
     assert trace.z[-1, 0] == pytest.approx(-0.15 * (5.0 - LEAVES) ** 2, abs=1e-12)
+    exact = run(-0.5, relay(("1", "-1"), guards))  # p - q is 0 at the end of a step
+    assert exact.transitions.edge.tolist() == ["rise"]
+    assert exact.sliding[0].t_start == pytest.approx(0.5, abs=1e-12)
 
 
 @pytest.mark.parametrize("source", ["above", "below"])

@@ -21,6 +21,7 @@ from gms_fsm import (
     Sampled,
     SimulationError,
     State,
+    StepLimitError,
     Supervisor,
     System,
     SystemState,
@@ -161,6 +162,8 @@ def test_an_error_leaves_everything_as_it_was(engine: str) -> None:
         assert (state.t, state.value("x"), state.value("u")) == (0.1, other.value("x"), 1.0)
     with pytest.raises(ParameterError):
         state.advance(0.1)
+    with pytest.raises(StepLimitError, match="one sample needs more than max_steps steps"):
+        SystemState(system, engine=engine, max_steps=3).advance(2.0, u=1.0)
     for each in (state, other):
         each.advance(0.1, u=0.5)
     assert state.value("pad.z1") == other.value("pad.z1")
