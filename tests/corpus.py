@@ -671,6 +671,38 @@ def belt(speed: Any = "0.1") -> System:
     )
 
 
+def dry(switching: bool) -> Chart:
+    """Return Coulomb friction: as two states, or as a sign."""
+    if not switching:
+        states = (State("on", outputs={"F": "F_c * sgn(v)"}),)
+        return Chart("sign", inputs=("v",), parameters=("F_c",), states=states)
+    return Chart(
+        "two states",
+        parameters=("F_c",),
+        states=(State("fwd", outputs={"F": "F_c"}), State("bwd", outputs={"F": "-F_c"})),
+        transitions=(
+            Transition("go", "bwd", "fwd", guard="v > 0"),
+            Transition("back", "fwd", "bwd", guard="v < 0"),
+        ),
+    )
+
+
+def side_by_side() -> System:
+    """Three bodies on dry friction of each kind, one of them with a ratio of 3."""
+    names, masses, forces = "abc", (1.0, 1.0, 0.5), ("0.2 * t", "0.3 * t", "0.25 * t")
+    bodies = tuple(
+        Body(name, inertia=m, force=force, x=f"x{name}", v=f"v{name}")
+        for name, m, force in zip(names, masses, forces, strict=True)
+    )
+    contacts = (
+        Contact("one", dry(True), {"F_c": 1.0}, v="va"),
+        Contact("two", dry(False), {"F_c": 1.0}, v="3 * vb"),
+        Contact("three", dry(False), {"F_c": 1.0}, v="vc"),
+    )
+    return System("side by side", bodies=bodies, contacts=contacts)
+
+
+BESIDE = {"va": 1.0, "vb": 0.5, "vc": 0.3}
 RANDOM_SEED, RANDOM_SHAPES = 7, 8
 
 
@@ -698,6 +730,7 @@ SYSTEM_RUNS: dict[str, Maker] = {
         (belt(),), 12.0, {"initial": {"q2": 0.2, "pad.states": ["backward"]}}
     ),
     "cradle with pads": _case(functools.partial(systems_cases.cradle, pads=True)),
+    "dry friction side by side": lambda: Run((side_by_side(),), 8.0, {"initial": BESIDE}),
     "hit, by step": lambda: Run(
         (systems_cases.hit(),),
         0.5,

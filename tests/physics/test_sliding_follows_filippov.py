@@ -34,8 +34,20 @@ from gms_fsm import (
 from gms_fsm.charts.zoo.joints.end_stop import END_STOP
 from gms_fsm.session.explain import explain
 from gms_fsm.traces.failures import LivelockError, NotUniqueError
+from integrators.sliding import solve
 from tests import older_files
-from tests.corpus import FALLING, HELD, PUSHED, Belt, coulomb, relay, runs_down
+from tests.corpus import (
+    BESIDE,
+    FALLING,
+    HELD,
+    PUSHED,
+    Belt,
+    coulomb,
+    dry,
+    relay,
+    runs_down,
+    side_by_side,
+)
 from tests.helpers import FASTEST, one_element, same_bits
 from tests.physics.test_hard_random_runs import (
     guards_say_so,
@@ -60,24 +72,8 @@ def on_surface(trace: Trace) -> np.ndarray:
     return np.asarray(trace.rows.mode[:, trace.n :].any(axis=1))
 
 
-def dry(switching: bool) -> Chart:
-    """Return Coulomb friction: as two states, or as a sign."""
-    if not switching:
-        states = (State("on", outputs={"F": "F_c * sgn(v)"}),)
-        return Chart("sign", inputs=("v",), parameters=("F_c",), states=states)
-    return Chart(
-        "two states",
-        parameters=("F_c",),
-        states=(State("fwd", outputs={"F": "F_c"}), State("bwd", outputs={"F": "-F_c"})),
-        transitions=(
-            Transition("go", "bwd", "fwd", guard="v > 0"),
-            Transition("back", "fwd", "bwd", guard="v < 0"),
-        ),
-    )
-
-
 # --------------------------------------------------------------------------- a sign, exactly
-SWINGS = {"v": 0.1 * (1.0 - np.cos(2.0**0.5 * 3.0))}
+SWINGS = {"v": 0.1 * (1.0 - np.cos(2.0**0.5 * 3.0)), "F": 1.0}
 NOT_LINEAR = "F_c * (sgn(v) + 0.6 * sgn(v) * sgn(v)) / 1.6"
 PULLED_SLOWLY = PulledSlider(1.0, 2.0, 0.1)
 FORCE = Slider(1.0, "0.5")
@@ -382,6 +378,43 @@ def test_elements_that_do_not_bear_on_each_other_slide_at_once() -> None:
     assert "element 2" in second.surface
     assert first.t_end == second.t_end == pytest.approx(LEAVES, abs=1e-12)
     assert trace.z[-1] == pytest.approx(-0.15 * (5.0 - LEAVES) ** 2, abs=1e-12)
+
+
+def test_signs_and_states_slide_side_by_side() -> None:
+    """Pulled by 0.2 t, 0.3 t and 0.25 t; F_c is 1 N, at the second body with a ratio of 3."""
+    trace = simulate(side_by_side(), 8.0, initial=BESIDE, engine="ifelse", rtol=1e-10)
+    found = {str(each.surface)[:2]: (each.t_start, each.t_end) for each in trace.sliding}
+    assert found == {
+        "va": pytest.approx((5.0 - 15.0**0.5, 5.0), abs=1e-9),  # 1 - t + 0.1 t^2 = 0, 0.2 t = F_c
+        "tw": pytest.approx((10.0 - (290.0 / 3.0) ** 0.5, 8.0), abs=1e-9),
+        "vc": pytest.approx((4.0 - 14.8**0.5, 4.0), abs=1e-9),
+    }
+    assert trace.body("c").v[-1] == pytest.approx(4.0, abs=1e-9)
+
+
+def test_a_run_may_begin_on_a_surface() -> None:
+    trace = run(0.0, relay(guards=("p >= q", "p < q")))
+    assert trace.transitions.edge.tolist() == ["rise"]
+    assert trace.sliding[0].t_start == 0.0
+
+
+def test_sigmas_are_those_of_a_linear_system() -> None:
+    """Whichever entry is the largest; at most 2; and 0 or 2 where a sign has no effect."""
+    rng = np.random.default_rng(3)
+    for n in (1, 2, 3, 4) * 5:
+        matrix, sigma = rng.normal(size=(n, n)), rng.uniform(-1.0, 1.0, n)
+        matrix[0, 0] *= n == 1  # another row has to come first
+        rows, found = np.column_stack([matrix, matrix @ sigma]).tolist(), [0.0] * n
+        solve(rows, n, found, 2.0)
+        assert found == pytest.approx(sigma, rel=1e-9)
+    for row, wanted in (
+        ([1.0, 9.0], 2.0),
+        ([-1.0, 9.0], -2.0),
+        ([0.0, -1.0], 2.0),
+        ([0.0, 0.0], 0),
+    ):
+        solve([row], 1, found, 2.0)
+        assert found[0] == wanted
 
 
 def test_surfaces_that_bear_on_each_other_are_refused() -> None:
