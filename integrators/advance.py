@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from integrators.crossings import (
+    AIMED,
+    MANY,
     NO_CHANGE,
     WAITING,
     Path,
@@ -18,6 +20,7 @@ from integrators.crossings import (
     first_change,
     is_quiet_step,
     longest_next,
+    steps_to_change,
 )
 from integrators.step_size import (
     INFINITY,
@@ -202,9 +205,10 @@ def advance(
     times = out.times
     adaptive = not plan.control.step > 0.0
     watching = len(w.active) > 0
-    waiting = False
-    for r in w.active:
-        waiting = waiting or w.watch[r] & WAITING != 0
+    why = 0
+    for each in w.watch:
+        why |= each
+    waiting = adaptive and why & WAITING != 0
     scaleless = False
     for j in range(len(y)):
         scaleless = scaleless or plan.control.atol[j] == 0.0
@@ -239,19 +243,22 @@ def advance(
                 now.h = calm
                 continue
             now.h = min(now.h, calm)
-        if waiting and adaptive:
+        if waiting:
             now.h = min(now.h, longest_next(motion, now, t_new, scratch, w))
         if near or wanted:
             fit_dense(plan.method, h, y, scratch)
         if near:
-            path = Path(motion, now.mode, interpolate, scratch.dense, t, t_new, seen, y_new)
+            path = Path(motion, now.mode, interpolate, scratch.dense, t, t_new, seen)
+            rough = tick
             if adaptive and not redone:
                 # If the stages lay far beyond the crossing they may have missed events before it:
                 # the step up to the crossing is repeated on its own, and a rough place is enough.
                 # Except if its length is almost zero: rounding might then undo the crossing, and a
-                # run would creep forward tick by tick.
-                theta = first_change(path, w, max(ROUGH * h, tick))
-                if theta <= ROUGH:  # perhaps almost zero
+                # run would creep forward tick by tick. Of many, the next one was aimed at.
+                if len(w.truth) <= MANY or len(w.active) <= MANY:
+                    rough = max(ROUGH * h, tick)
+                theta = first_change(path, w, rough)
+                if theta <= ROUGH and rough > tick:  # perhaps almost zero
                     theta = first_change(path, w, tick)
                 if wanders and theta < NO_CHANGE and theta * h - calm > AT_ONCE * tick:
                     now.h = max(calm, theta * h - CALM_STEPS * calm)
@@ -260,12 +267,15 @@ def advance(
                     now.h = theta * h
                     redone = True
                     continue
-            if theta != NO_CHANGE or not adaptive or redone:
+            if not adaptive or redone or (theta != NO_CHANGE and rough > tick):
                 theta = first_change(path, w, tick)
         redone = False
         if theta < 1.0:
             t_new = min(t + theta * h, t_new)
         else:
+            if adaptive and len(w.truth) > MANY and len(w.active) > MANY:
+                ahead = AIMED * h * (steps_to_change(w, w.end) - 1.0)
+                now.h = min(now.h, max(ahead, max(ROUGH * h, tick)))
             copy_margins(w, w.end, w.start)
         if wanted:
             _put_wanted(motion, now, out, scratch.dense, h, t_new)

@@ -53,6 +53,11 @@ MOST_BENT = 0.1
 # A margin above this is not below zero: there is no number between them. So one comparison decides.
 JUST_BELOW = -5e-324
 DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
+# Where more relations are watched, they change one soon after another. Steps are aimed at the next
+# change, and a search goes on longer by slopes alone.
+MANY = 500
+PATIENCE = 5  # probes that may fail to halve a bracket of many
+AIMED = 1.05  # of the time to the next change
 
 
 class Search(NamedTuple):
@@ -65,6 +70,7 @@ class Search(NamedTuple):
     rights: list[Vector]  # margins at right ends of intervals to search, shape (DEEPEST + 1, r)
     places: Vector  # positions of these right ends, shape (DEEPEST + 1,)
     depths: list[int]  # how often they were halved, shape (DEEPEST + 1,)
+    few: list[int]  # space for the indices of those that have changed, shape (r,)
 
 
 class Watched(NamedTuple):
@@ -91,7 +97,6 @@ class Path(NamedTuple):
     t: float
     t_new: float
     seen: float  # the time at which its end is seen: t_new, or one clock tick before a jump there
-    y_new: Vector  # state at t_new
 
 
 def watched(strict: list[bool], size: int) -> Watched:
@@ -122,6 +127,7 @@ def watched(strict: list[bool], size: int) -> Watched:
         rights=[vector() for _ in range(DEEPEST + 1)],
         places=[0.0] * (DEEPEST + 1),
         depths=[0] * (DEEPEST + 1),
+        few=[0] * r,
     )
     above = [0.0 if each else JUST_BELOW for each in strict]
     return Watched([0] * r, [0] * r, [], [False] * r, [0] * r, above, vector(), vector(), search)
@@ -202,6 +208,27 @@ def is_quiet_step(motion: ArcMotion, now: Now, t_new: float, scratch: Scratch, w
     return _is_quiet(w, w.start, probe, w.end)
 
 
+def steps_to_change(w: Watched, after: Vector) -> float:
+    """Return when the first relation changes if margins go on as from the start to `after`."""
+    first = INFINITY
+    for r in w.active:
+        left, gone = w.start[r], w.start[r] - after[r]
+        if gone < 0.0:
+            left, gone = -left, -gone
+        if 0.0 < left < first * gone:  # to divide takes long, and is seldom wanted
+            first = left / gone
+    return first
+
+
+def aimed_step(motion: ArcMotion, now: Now, h: float, w: Watched) -> float:
+    """Return a first step to just beyond the next change, as far as slopes at the start tell."""
+    y, f, place, probe = now.y, now.f, w.search.y_probe, w.search.probe
+    for j in range(len(y)):
+        place[j] = y[j] + h * f[j]
+    motion.margins(min(now.t + h, now.seen), place, now.mode, motion.p, w.watch, probe)
+    return AIMED * h * steps_to_change(w, probe)
+
+
 def longest_next(motion: ArcMotion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> float:
     """Return how long the next step may be, from how waiting margins bend in this one.
 
@@ -242,8 +269,7 @@ def longest_next(motion: ArcMotion, now: Now, t_new: float, scratch: Scratch, w:
 def first_change(path: Path, w: Watched, resolution: float) -> float:
     """Return the fraction of the step at which a watched truth value first differs.
 
-    Expects ``w.start`` to contain the margins at its start; for `NO_CHANGE`, ``w.end`` contains
-    those at its end.
+    Expects ``w.start`` and ``w.end`` to contain the margins at its start and its end.
 
     Parameters
     ----------
@@ -259,21 +285,19 @@ def first_change(path: Path, w: Watched, resolution: float) -> float:
     float
         In (0, 1], or `NO_CHANGE`.
     """
-    motion, search = path.motion, w.search
-    motion.margins(path.seen, path.y_new, path.mode, motion.p, w.watch, w.end)
+    search = w.search
     found = NO_CHANGE
     low, high = 0.0, 1.0
     quiet = 1.0  # the step up to this point must be searched; its margins are in rights[0]
-    copy_margins(w, w.end, search.rights[0])
     if any_changed(w, w.end):
-        copy_margins(w, w.start, search.low)
-        copy_margins(w, w.end, search.high)
-        quiet, found = _bracket(path, low, high, w, resolution)
+        quiet, found = _close(path, low, high, w.start, w.end, w, resolution)
+    else:
+        copy_margins(w, w.end, search.rights[0])
     while quiet > 0.0:
         low, high = _search(path, quiet, w)
         if high == NO_CHANGE:
             break
-        quiet, found = _bracket(path, low, high, w, resolution)
+        quiet, found = _close(path, low, high, search.low, search.high, w, resolution)
     return found
 
 
@@ -286,19 +310,62 @@ def _probe(path: Path, place: float, w: Watched) -> bool:
     return any_changed(w, search.probe)
 
 
-def _bracket(
-    path: Path, low: float, high: float, w: Watched, resolution: float
+def _close(
+    path: Path,
+    low: float,
+    high: float,
+    left: Vector,
+    right: Vector,
+    w: Watched,
+    resolution: float,
 ) -> tuple[float, float]:
-    """Close the bracket (low unchanged, high changed; margins in search.low, search.high).
+    """Close the bracket (low unchanged, high changed), given the margins at both.
 
     Leaves the margins at the point before the change in ``search.rights[0]``, for `_search`.
     """
     search = w.search
+    if len(w.truth) <= MANY or len(w.active) <= MANY:
+        copy_margins(w, left, search.low)
+        copy_margins(w, right, search.high)
+        low, high = _bracket(path, low, high, w, resolution)
+        copy_margins(w, search.low, search.rights[0])
+        return low, high
+    while True:
+        few = _changed(w, right)
+        copy_margins(few, left, search.low)
+        copy_margins(few, right, search.high)
+        low, high = _bracket(path, low, high, few, resolution)
+        if low <= 0.0 or not _probe(path, low, w):
+            copy_margins(w, search.probe, search.rights[0])
+            return low, high
+        low, high, left, right = 0.0, low, w.start, search.probe
+
+
+def _changed(w: Watched, margin: Vector) -> Watched:
+    """Return the relations that have changed as the only active ones."""
+    flags, few = w.changed, w.search.few
+    for r in range(len(flags)):
+        flags[r] = 0
+    count = 0
+    for r in w.active:
+        if (margin[r] > w.above[r]) != w.truth[r]:
+            flags[r] = 1
+            few[count] = r
+            count += 1
+    return Watched(flags, few, few[:count], w.truth, flags, w.above, w.start, w.end, w.search)
+
+
+def _bracket(
+    path: Path, low: float, high: float, w: Watched, resolution: float
+) -> tuple[float, float]:
+    """Close the bracket (low unchanged, high changed; margins in search.low, search.high)."""
+    search = w.search
     tolerance = max(resolution / (path.t_new - path.t), 4e-16)
-    halve = False
+    patience = PATIENCE if len(w.truth) > MANY else 1  # which is known while translating
+    missed = 0
     while high - low > tolerance:
         guess = 0.5 * (low + high)
-        if not halve:
+        if missed < patience:
             guess = high
             for r in w.active:
                 b = search.high[r]
@@ -315,8 +382,7 @@ def _bracket(
         else:
             low = guess
             copy_margins(w, search.probe, search.low)
-        halve = high - low > 0.5 * width
-    copy_margins(w, search.low, search.rights[0])
+        missed = missed + 1 if high - low > 0.5 * width else 0
     return low, high
 
 

@@ -25,7 +25,15 @@ from integrators.advance import (
     raise_floor,
     tick_at,
 )
-from integrators.crossings import FOR_A_GUARD, FOR_A_SIGN, JUST_BELOW, Watched, listed
+from integrators.crossings import (
+    FOR_A_GUARD,
+    FOR_A_SIGN,
+    JUST_BELOW,
+    MANY,
+    Watched,
+    aimed_step,
+    listed,
+)
 from integrators.sliding import Functions, Held, Sliding, arm_on, margins_on, other_mode
 from integrators.step_size import INFINITY, error_norm, starting_step
 from integrators.steps import ArcMotion, Now, Scratch, Vector, time_of
@@ -177,7 +185,7 @@ def run_to_event(
             if event == NOTHING and plan.located and memory.phase == BEGIN:
                 event = _rearm(plan, on, now, relations, memory)
         elif phase == BEGIN:
-            event = _begin_arc(motion, plan, now, out, scratch, memory)
+            event = _begin_arc(motion, plan, now, relations, out, scratch, memory)
         elif phase == ARC:
             steps = _steps_ahead(plan, out, most_steps)
             if steps > 0 and not plan.foreign:
@@ -373,9 +381,11 @@ def _rearm(plan: RunPlan, on: Held, now: Now, relations: Watched, memory: Memory
     for k in range(len(surfaces.sign)):
         if surfaces.machine[k] < 0:
             w.above[surfaces.above[k]], w.above[surfaces.at_least[k]] = 0.0, JUST_BELOW
+    undefined = False  # a comparison that is NaN would never turn true
     for r in w.active:
         g = w.start[r]
         w.truth[r] = g > w.above[r]
+        undefined = undefined or g != g
     for k in range(len(surfaces.sign)):  # one met exactly is left on the side of its sign
         sign = held[surfaces.sign[k]] if surfaces.machine[k] < 0 else 0.0
         if watch[surfaces.above[k]] and sign != 0.0:
@@ -386,7 +396,7 @@ def _rearm(plan: RunPlan, on: Held, now: Now, relations: Watched, memory: Memory
                     # A difference of large velocities may stay 0 for some ticks.
                     if w.start[r] == 0.0:
                         w.above[r] = JUST_BELOW if sign > 0.0 else 0.0
-    if _undefined(w):
+    if undefined:
         memory.phase = AFTER
         memory.status = NOT_FINITE
     elif slid:  # y is on the surface now: comparisons with it must be evaluated again
@@ -406,16 +416,14 @@ def _list(relations: Watched, memory: Memory) -> Watched:
     return listed(relations, active)
 
 
-def _undefined(w: Watched) -> bool:
-    """Return whether a comparison that keeps a guard false is NaN: it would never turn true."""
-    undefined = False
-    for r in w.active:
-        undefined = undefined or w.start[r] != w.start[r]
-    return undefined
-
-
 def _begin_arc(
-    motion: ArcMotion, plan: RunPlan, now: Now, out: Output, scratch: Scratch, memory: Memory
+    motion: ArcMotion,
+    plan: RunPlan,
+    now: Now,
+    relations: Watched,
+    out: Output,
+    scratch: Scratch,
+    memory: Memory,
 ) -> int:
     """Compute the slope and choose the first step after a switch or a jump."""
     control = plan.control
@@ -428,11 +436,27 @@ def _begin_arc(
             # Without location the solver knows nothing of switches: it keeps its step.
             if control.step <= 0.0 and (plan.located or now.h <= 0.0):
                 now.error_before = 1.0
-                knot = knot_after(plan, now, out)
-                order = plan.method.error_order
-                first = starting_step(motion, order, control, now, knot, scratch)
+                first = _first_step(motion, plan, now, relations, out, scratch, memory)
                 now.h = max(first, tick_at(now.t))  # a knot may be a few ticks away
     return ADVANCE if plan.foreign else NOTHING
+
+
+def _first_step(
+    motion: ArcMotion,
+    plan: RunPlan,
+    now: Now,
+    relations: Watched,
+    out: Output,
+    scratch: Scratch,
+    memory: Memory,
+) -> float:
+    """Return the first step of an arc: to the next change if that is near, and many are watched."""
+    if len(relations.truth) > MANY and memory.active > MANY and now.h > 0.0:
+        aimed = aimed_step(motion, now, 0.1 * now.h, listed(relations, memory.active))
+        if aimed < 0.5 * now.h:
+            return aimed
+    knot, order = knot_after(plan, now, out), plan.method.error_order
+    return starting_step(motion, order, plan.control, now, knot, scratch)
 
 
 def _steps_ahead(plan: RunPlan, out: Output, most_steps: int) -> int:

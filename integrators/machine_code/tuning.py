@@ -11,7 +11,7 @@ NOT_INLINE = [
     "_search", "_put_firing", "_put_stop", "_begin_arc", "_choose_stop", "_fired",
     "_finish", "_jump", "_list", "_make_due", "_no_progress", "_often_changed",
     "only_new", "cut", "only_let_go", "_pick", "jolted", "arrived", "jolts", "_act",
-    "_refuse", "_count", "_rearm", "_reset_counts", "_reset_if_advanced", "_start", "_undefined",
+    "_refuse", "_count", "_rearm", "_reset_counts", "_reset_if_advanced", "_start",
     "advance", "_begin", "_impulse", "step_to",
     "arm_on", "drop", "entangled", "let_go", "look_back", "look_held", "release", "_ask", "_bears",
     "_along", "arrive", "fix", "slide_in_lanes", "margins_in_lanes", "_await",

@@ -124,7 +124,8 @@ class SciPyStepper:
             tick = tick_at(max(abs(t), abs(t_new)))
             theta = NO_CHANGE
             if w.active:
-                path = Path(motion, now.mode, _interpolate, dense, t, t_new, t_new, y_new)
+                path = Path(motion, now.mode, _interpolate, dense, t, t_new, t_new)
+                margins_on(t_new, y_new, now.mode, self.on, w.watch, w.end)
                 theta = first_change(path, w, tick)
             if theta < REDO and not redone and theta * (t_new - t) > AT_ONCE * tick:
                 # As in the kernel: the solver's stages lay beyond the crossing.

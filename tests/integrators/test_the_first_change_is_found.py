@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from integrators.crossings import (
+    MANY,
     NO_CHANGE,
     Path,
     first_change,
@@ -43,9 +44,11 @@ def _first(*margins: Margin, strict: bool = False, resolution: float = 1e-12) ->
     def interpolate(_: None, theta: float, out: list[float]) -> None:
         out[0] = theta
 
-    path = Path(ArcMotion(fill, fill, None, None), [], interpolate, None, 0.0, 1.0, 1.0, [1.0])
+    path = Path(ArcMotion(fill, fill, None, None), [], interpolate, None, 0.0, 1.0, 1.0)
+    fill(1.0, [1.0], [], None, w.watch, w.end)
     place = first_change(path, w, resolution)
     looks.clear()
+    fill(1.0, [1.0], [], None, w.watch, w.end)
     # Whatever the scratch space contained before the search.
     assert first_change(path, w, resolution) == place
     return place, len(looks)
@@ -240,7 +243,8 @@ def _of_a_step(t: float, h: float, resolution: float) -> tuple[float, int]:
     w.watch[0] = 1
     w.active.append(0)
     w.start[0] = -0.3
-    path = Path(ArcMotion(fill, fill, None, None), [], interpolate, None, t, t + h, t + h, [1.0])
+    path = Path(ArcMotion(fill, fill, None, None), [], interpolate, None, t, t + h, t + h)
+    fill(t + h, [1.0], [], None, w.watch, w.end)
     return first_change(path, w, resolution), len(looks)
 
 
@@ -259,3 +263,23 @@ def test_a_window_in_the_second_half_is_closed_by_its_slope() -> None:
     place, probes = _first(lambda t: (t - 0.6) * (0.8 - t), resolution=1e-12)
     assert 0.6 <= place < 0.6 + 1e-11
     assert probes <= 10
+
+
+@pytest.mark.parametrize(
+    ("margins", "first"),
+    [
+        ([lambda t: t - 0.8], 0.8),
+        ([lambda t: t**3 - 0.512], 0.8),
+        ([lambda t: t - 0.9, lambda t: t - 0.8], 0.8),
+        # One that is as before at the end, but not where the other one changes, or only before it.
+        ([lambda t: t - 0.8, lambda t: (t - 0.7) * (0.81 - t)], 0.7),
+        ([lambda t: t - 0.8, lambda t: (t - 0.3) * (0.6 - t)], 0.3),
+        ([lambda t: 0.8 - t, lambda t: (t - 0.7) * (t - 0.81)], 0.7),
+    ],
+)
+def test_among_many_that_do_not_change_it_is_the_same(margins: list[Margin], first: float) -> None:
+    """Then only those are looked at on the way that have changed, and slopes are trusted longer."""
+    quiet = [lambda t: -1.0] * MANY
+    place, probes = _first(*margins, *quiet)
+    assert 0.0 <= place - first < 1e-11
+    assert probes <= 2 * _first(*margins)[1]

@@ -8,10 +8,22 @@ import numpy as np
 import pytest
 
 import integrators
-from gms_fsm import Chart, ChartModel, Prescribed, Record, State, Stribeck, simulate
+from gms_fsm import (
+    GMS,
+    Chart,
+    ChartModel,
+    GMSParameters,
+    Prescribed,
+    PulledSlider,
+    Record,
+    State,
+    Stribeck,
+    simulate,
+)
 from gms_fsm.charts.registry import registered
 from gms_fsm.lowering.program import lower
 from gms_fsm.run.machines import IfElse
+from integrators import advance
 from tests.corpus import trace as run_of
 from tests.helpers import FASTEST, FIG4_SINE, event_sequence, one_element, pulled_mass, stick_slip
 
@@ -125,6 +137,32 @@ def test_slipping_for_an_hour_costs_few_steps() -> None:
     trace = simulate(one_element("signed", C=1e-3), Prescribed(0.1), 3600.0, t_eval=[3600.0])
     assert len(trace.transitions) == 1
     assert len(trace.stops) == 4  # the start, the break-away before and after, the end
+
+
+@pytest.mark.slow
+def test_of_many_elements_each_switch_costs_one_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps are aimed at the next of 2,000 break-aways; times and bits are those of other runs."""
+    n = 2000
+    w, share = np.linspace(0.0025, 0.0175, n), np.full(n, 1 / n)
+    curve = Stribeck(1.0, 1.5, 0.05)
+    friction = GMSParameters(share / w, share, np.full(n, 0.02), sigma_2=0.4, v_c=1e-6, weights=w,
+                             stribeck=curve)  # fmt: skip
+    bank, rig, t_end = GMS(friction, law="signed"), PulledSlider(1.0, 2.0, 0.1), 2.52
+    tried, take_step = [], advance.take_step
+
+    def counted(motion, method, now, t_new, scratch):
+        tried.append(now.t)
+        take_step(motion, method, now, t_new, scratch)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(advance, "take_step", counted)
+        trace = simulate(bank, rig, t_end, engine="ifelse")
+    t = trace.transitions.t
+    assert event_sequence(trace) == [(i, "break_away_forward") for i in range(7)]
+    assert sum(begun >= t[0] for begun in tried) <= t.size + 2
+    fine = simulate(bank, rig, t_end, engine=FASTEST, rtol=1e-9)
+    np.testing.assert_allclose(t, fine.transitions.t, rtol=0, atol=1e-7)
+    assert simulate(bank, rig, t_end, engine=FASTEST).transitions.t.tolist() == t.tolist()
 
 
 def test_a_sign_that_turns_does_not_shorten_the_steps() -> None:
