@@ -390,6 +390,10 @@ def test_signs_and_states_slide_side_by_side() -> None:
         "vc": pytest.approx((4.0 - 14.8**0.5, 4.0), abs=1e-9),
     }
     assert trace.body("c").v[-1] == pytest.approx(4.0, abs=1e-9)
+    for t in (3.5, 4.5):  # on three of them, and on two
+        shown = trace.sample([t])
+        forces = [shown.contact(name).F[0] for name in ("one", "two", "three")]
+        assert forces == pytest.approx([0.2 * t, 0.1 * t, min(0.25 * t, 1.0)], abs=1e-12)
 
 
 def test_a_run_may_begin_on_a_surface() -> None:
