@@ -84,6 +84,17 @@ NEAR = {  # module: its tests, those that detect most first
         "integrators/test_steps_and_stops",
         *PHYSICS,
     ],
+    "integrators/switching/sliding_bounds.py": [
+        "laws/test_the_bits_are_the_approved_ones",
+        "physics/test_sliding_follows_filippov",
+        "systems/test_supervisors_see_and_are_seen",
+        "run/test_every_run_ends",
+    ],
+    "integrators/switching/jolts.py": [
+        "laws/test_the_bits_are_the_approved_ones",
+        "systems/test_locks_and_impacts",
+        "systems/test_times_and_events",
+    ],
     "integrators/step_size.py": [
         "laws/test_the_bits_are_the_approved_ones",
         "integrators/test_steps_and_stops",
