@@ -92,6 +92,14 @@ def foreign(old: str = "", new: str = "", folder: Path = Path(), **texts: Any) -
     return Chart.from_scxml(path, **{**beside, **texts})
 
 
+def of_states(states: str, folder: Path, **texts: Any) -> Chart:
+    """Return the chart of a document with these states, without a force if none is given."""
+    path = folder / "own.scxml"
+    text = f'<scxml xmlns="http://www.w3.org/2005/07/scxml">{states}</scxml>'
+    path.write_text(text, encoding="utf-8")
+    return Chart.from_scxml(path, **{"outputs": {"F": "0"}, **texts})
+
+
 def edited_export(old: str, new: str, folder: Path = Path()) -> Path:
     """Return an exported document that somebody has changed."""
     path, *_ = export(CHARTS["seven-parameter"], "scxml", folder, name="file")

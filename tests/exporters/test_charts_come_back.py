@@ -32,6 +32,7 @@ from tests.exporters.charts_to_export import (
     foreign,
     imported,
     model,
+    of_states,
     one_edge,
     rebuilt,
     small,
@@ -167,13 +168,9 @@ ORDINARY = """\
 
 def test_a_log_is_named_once_and_names_may_come_from_a_generator(tmp_path: Path) -> None:
     inside = '<state id="held"><onentry><log/></onentry></state>'
-    text = (
-        f'<scxml xmlns="http://www.w3.org/2005/07/scxml"><state id="out">{inside}</state></scxml>'
-    )
-    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
     given = {"inputs": iter("v"), "parameters": iter("k"), "outputs": {"F": "k * v"}}
     with pytest.warns(UserWarning, match="a chart writes nothing: state 'held', onentry$"):
-        chart = Chart.from_scxml(tmp_path / "own.scxml", **given)  # type: ignore[arg-type]
+        chart = of_states(f'<state id="out">{inside}</state>', tmp_path, **given)
     assert (chart.inputs, chart.parameter_names) == (("v",), ("k",))
 
 
@@ -206,12 +203,11 @@ def test_an_ordinary_document(tmp_path: Path) -> None:
 
 
 def test_a_state_that_is_done_is_left_from_its_final_state(tmp_path: Path) -> None:
-    text = """<scxml xmlns="http://www.w3.org/2005/07/scxml"><state id="work">
+    states = """<state id="work">
       <state id="work.busy"><transition cond="v &gt; 1" target="work.idle"/></state>
       <final id="work.idle"/>
-      <transition event="done.state.work" target="rest"/></state><state id="rest"/></scxml>"""
-    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
-    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
+      <transition event="done.state.work" target="rest"/></state><state id="rest"/>"""
+    chart = of_states(states, tmp_path)
     edges = {(edge.source, edge.target, edge.guard) for edge in chart.transitions}
     assert edges == {("work.busy", "work.idle", "v > 1"), ("work.idle", "rest", "True")}
 
@@ -225,9 +221,7 @@ def test_an_event_that_a_state_sends_itself_later_is_the_time_in_it(tmp_path: Pa
     stopped = '<onexit><cancel sendid="timeout"/></onexit><transition cond="v>9" target="green"/>'
     states = state("green", "30s", "yellow") + state("yellow", "500ms", "red")
     states += state("red", "1.5s", "green", stopped)
-    text = f'<scxml xmlns="http://www.w3.org/2005/07/scxml">{states}</scxml>'
-    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
-    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
+    chart = of_states(states, tmp_path)
     edges = [(edge.source, edge.target, edge.guard) for edge in chart.transitions]
     assert edges == [
         ("green", "yellow", "after(30)"),
@@ -240,21 +234,17 @@ def test_an_event_that_a_state_sends_itself_later_is_the_time_in_it(tmp_path: Pa
 def test_what_outer_states_assign_at_the_start_are_initial_values(tmp_path: Path) -> None:
     outer = '<onentry><assign location="n" expr="n + 1"/></onentry>'
     inner = '<onentry><assign location="n" expr="2 * n"/></onentry>'
-    text = f"""<scxml xmlns="http://www.w3.org/2005/07/scxml">
-      <datamodel><data id="n" expr="3"/></datamodel>
-      <state id="a">{outer}<state id="b">{inner}</state></state></scxml>"""
-    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
-    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
+    text = f"""<datamodel><data id="n" expr="3"/></datamodel>
+      <state id="a">{outer}<state id="b">{inner}</state></state>"""
+    chart = of_states(text, tmp_path, outputs={"F": "n"})
     assert simulate(ChartModel(chart, {}), Prescribed("0"), 0.1).F[0] == 8
     text = text.replace("n + 1", "v")
-    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
-    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
+    chart = of_states(text, tmp_path, outputs={"F": "n"})
     assert simulate(ChartModel(chart, {}), Prescribed("2"), 0.1).F[0] == 4
     internal = '<transition type="internal" cond="v &gt; 5" target="b"/><state id="b">'
     text = text.replace('<state id="b">', internal)  # which makes the states flat
-    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
     with pytest.raises(ChartError, match="at the start its entry assigns 'v' to 'n', which is no"):
-        Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "n"})
+        of_states(text, tmp_path, outputs={"F": "n"})
 
 
 def test_words_of_ecmascript() -> None:
@@ -266,9 +256,7 @@ def test_one_event_is_two_edges_where_one_would_change_the_priority(tmp_path: Pa
     turn = '<transition event="turn" cond="v > 2" target="d"/>'
     rest = '<state id="c"/><state id="d"/>'
     text = f'<state id="a">{go}{turn}</state><state id="b">{turn}{go}</state>{rest}'
-    text = f'<scxml xmlns="http://www.w3.org/2005/07/scxml">{text}</scxml>'
-    (tmp_path / "own.scxml").write_text(text, encoding="utf-8")
-    chart = Chart.from_scxml(tmp_path / "own.scxml", outputs={"F": "0"})
+    chart = of_states(text, tmp_path)
     first = {state: chart.leaving(state)[0][1].target for state in ("a", "b")}
     assert first == {"a": "c", "b": "d"}
     assert {edge.name for edge in chart.transitions} == {"turn", "a_c", "b_c"}
