@@ -11,7 +11,7 @@ import functools
 import importlib.util
 import math
 import zlib
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -278,7 +278,6 @@ FALLING = ("1 - 0.3 * t", "-1 - 0.3 * t")
 def relay(
     flows: tuple[str, str] = RISING,
     guards: tuple[str, str] = ("p > q", "p < q"),
-    more: Sequence[Transition] = (),
     n: int = 1,
 ) -> ChartModel:
     """A variable p pushed towards q from both sides, along which the run slides."""
@@ -296,7 +295,6 @@ def relay(
         transitions=(
             Transition("rise", "below", "above", guard=guards[0]),
             Transition("fall", "above", "below", guard=guards[1]),
-            *more,
         ),
         outputs={"F": "k * p"},
     )

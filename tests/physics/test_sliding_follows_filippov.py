@@ -7,6 +7,7 @@ in a livelock error.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -325,10 +326,13 @@ def test_it_leaves_by_its_edge_however_the_guards_are_written(guards: tuple[str,
 
 
 @pytest.mark.parametrize("source", ["above", "below"])
-def test_edges_of_both_states_leave_it(source: str) -> None:
+@pytest.mark.parametrize("first", [False, True])
+def test_edges_of_both_states_leave_it(source: str, first: bool) -> None:
     """From the state that was not entered last, its edge there is taken first."""
     off = Transition("switch_off", source, "off", guard="t > 2")
-    trace = run(model=relay(more=[off]))
+    chart = relay().chart
+    edges = (off, *chart.transitions) if first else (*chart.transitions, off)
+    trace = run(model=ChartModel(replace(chart, transitions=edges), {"k": 1.0}))
     there = [] if source == "above" else ["fall"]
     assert trace.transitions.edge.tolist() == ["rise", *there, "switch_off"]
     assert trace.sliding[0].t_end == pytest.approx(2.0, abs=1e-12)
