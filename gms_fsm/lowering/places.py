@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, TypeVar
@@ -119,34 +119,48 @@ class Places(Generic[Name]):
     # ------------------------------------------------------------------ as text
     def text(self, name: Name) -> str:
         """Return a place as Python text over ``i`` and the sizes."""
-        if name in self.shared:
-            return str(self.shared.index(name))
-        return total([self.start_text(name), "i"])
+        block, place = self._found[name]
+        return str(place) if block < 0 else total([self.start_text(name), "i"])
 
     def start_text(self, name: Name, after: int = 0) -> str:
         """Return the first place of a name as Python text over the sizes."""
-        if name in self.shared:
-            return str(self.shared.index(name) + after)
-        terms = [str(len(self.shared))]
-        for block in self.blocks:
-            rows = block.names.index(name) + after if name in block.names else len(block.names)
-            if rows:
-                terms.append(_times(rows, block.size))
-            if name in block.names:
-                break
-        return total(terms)
+        block, place = self._found[name]
+        if block < 0:
+            return str(place + after)
+        rows = [_times(place + after, self.blocks[block].size)] if place + after else []
+        return total([*self._before[block], *rows])
 
     def sizes(self, name: Name) -> frozenset[str]:
         """Return which sizes the text of a place reads."""
-        found = set[str]()
-        if name in self.shared:
+        block, place = self._found[name]
+        if block < 0:
             return frozenset()
+        return self._sizes[block] | ({self.blocks[block].size} if place else set())
+
+    @cached_property
+    def _found(self) -> Mapping[Name, tuple[int, int]]:
+        """The block of each name, -1 if it is shared, and its place among the names there."""
+        groups = enumerate((self.shared, *(block.names for block in self.blocks)), -1)
+        return {name: (k, place) for k, names in groups for place, name in enumerate(names)}
+
+    @cached_property
+    def _before(self) -> Sequence[Sequence[str]]:
+        """The terms of the first place of each block."""
+        terms = [str(len(self.shared))]
+        found = [terms]
         for block in self.blocks:
-            if name in block.names:
-                return frozenset(found | ({block.size} if block.names.index(name) else set()))
-            if block.names:
-                found.add(block.size)
-        raise KeyError(name)
+            rows = [_times(len(block.names), block.size)] if block.names else []
+            terms = total([*terms, *rows]).split(" + ")
+            found.append(terms)
+        return found
+
+    @cached_property
+    def _sizes(self) -> Sequence[frozenset[str]]:
+        """The sizes of the blocks before each one."""
+        found = [frozenset[str]()]
+        for block in self.blocks:
+            found.append(found[-1] | ({block.size} if block.names else set()))
+        return found
 
     def size_text(self, more: int = 0) -> str:
         """Return how many places there are, and some more, as Python text over the sizes."""

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -296,13 +296,14 @@ def _names(callables: Mapping[str, Callable[[float], float]]) -> dict[str, Any]:
 def _jolts(plan: ProgramPlan) -> dict[str, Any]:
     """Return what a run has to know about impulses, and about velocities that jump."""
     read = plan.read
-    if (count := len(read.system.events)) > MOST_EVENTS:
+    events = read.system.events
+    if len(events) > MOST_EVENTS:
         raise ParameterError(
-            f"its charts wait for {count} events",
+            f"its charts wait for {len(events)} events",
             place=f"system {read.system.name!r}",
             advice=f"at most {MOST_EVENTS} are told apart; let edges read a number instead",
         )
-    kinds = [_kind(plan, bank, edge) for bank in read.banks for edge in bank.edges]
+    kinds = [_kind(events, bank, edge) for bank in read.banks for edge in bank.edges]
     held = [bank for bank in read.banks if bank.chart.locks or bank.chart.sets_velocity]
     velocities = [name for bank in held for name in bank.velocities]
     if not any(bank.chart.locks for bank in held):
@@ -317,14 +318,14 @@ def _jolts(plan: ProgramPlan) -> dict[str, Any]:
     }
 
 
-def _kind(plan: ProgramPlan, bank: Bank, edge: ContactEdge) -> int:
+def _kind(events: Sequence[str], bank: Bank, edge: ContactEdge) -> int:
     """Return what matters to others about an edge, as bits."""
     kind = TICK if bank.periodic else 0
     if bank.is_impulse(edge):
         kind |= IMPULSE
     elif edge.source in bank.locked and not edge.locks:
         kind |= CHANGES_FORCES
-    for k, event in enumerate(plan.read.system.events):
+    for k, event in enumerate(events):
         if event in names_in(edge.guard):
             kind |= EVENT << k
     return kind

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import Literal, TypeAlias
 
-from gms_fsm.language import Name, names_in
+from gms_fsm.language import Name, Value, names_in
 from gms_fsm.lowering.places import Places
 from gms_fsm.lowering.printing.lines import TABLES, CodeLine, ProgramWriter, Signs
 from gms_fsm.lowering.printing.locks import Locks
@@ -38,12 +38,17 @@ class ForceWriter(ProgramWriter):
 
     def rounded(self, name: str) -> list[CodeLine]:
         """Write that the velocity of a contact is zero where locks leave only rounding of it."""
-        rows = {
+        rows = self.rows
+        return self.locks.rounded(name, rows[name]) if self.locking and name in rows else []
+
+    @cached_property
+    def rows(self) -> Mapping[str, Mapping[str, Value]]:
+        """The coefficients of each contact's velocity, by body."""
+        return {
             velocity: row
             for bank in self.read.banks
             for velocity, row in zip(bank.velocities, bank.jacobian, strict=True)
         }
-        return self.locks.rounded(name, rows[name]) if self.locking and name in rows else []
 
     def forces(
         self, signs: Signs, *, wanted: bool, rates: bool = False, observed: bool = False

@@ -23,6 +23,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 from gms_fsm.language import Binary, Name, Negative, Number, Value, names_in, spell
 from gms_fsm.lowering.printing.lines import CodeLine, ProgramWriter, indented, reads_of
@@ -55,6 +57,15 @@ class Lock:
     bank: int
     velocity: int
     row: Mapping[str, Value]
+
+
+class Elimination(NamedTuple):
+    """How the equations of locks are solved as L D L'."""
+
+    entries: Mapping[tuple[int, int], Value]  # of the matrix, by row and column, below or on D
+    order: list[int]
+    left: Mapping[int, list[int]]  # of each row the columns of L that are not zero, in order
+    below: Mapping[int, list[int]]  # of each column the rows
 
 
 class Locks:
@@ -111,58 +122,68 @@ class Locks:
     # ------------------------------------------------------------------ the equations
     def solve(self, right: Mapping[int, Value]) -> list[CodeLine]:
         """Write the solution hold_r of the equations, with flags l_r and right sides."""
-        put, rows = self.writer.put, range(len(self.rows))
-        entries = {
-            (r, s): value
-            for r in rows
-            for s in range(r + 1)
-            if (value := self.weight(self.rows[r], self.rows[s])) is not None
-        }
-        order = self.order({key for key in entries if key[0] != key[1]})
-        place = {r: k for k, r in enumerate(order)}
-        # Which entries of L are not zero: those of the matrix, and what elimination fills in.
-        lower = {
-            (r, s) if place[r] > place[s] else (s, r) for r, s in entries if place[r] != place[s]
-        }
-        for k in order:
-            below = [r for r in order if (r, k) in lower]
-            lower |= {(r, s) for r in below for s in below if place[r] > place[s]}
+        put = self.writer.put
+        entries, order, left, below = self.elimination
         lines: list[CodeLine] = []
         for s in order:
             diagonal = entries[s, s]
             lines.append(put(f"W_{s}", diagonal))
-            less = "".join(f" - L_{s}_{k} * L_{s}_{k} * D_{k}" for k in order if (s, k) in lower)
+            less = "".join(f" - L_{s}_{k} * L_{s}_{k} * D_{k}" for k in left[s])
             lines += [
                 CodeLine(f"D_{s} = W_{s}{less}"),
                 CodeLine(f"if l_{s} == 0.0 or D_{s} <= {DEPENDENT} * W_{s}:"),
                 CodeLine(f"    l_{s} = 0.0"),
                 CodeLine(f"    D_{s} = 1.0"),
             ]
-            for r in order:
-                if (r, s) in lower:
-                    entry = entries.get((max(r, s), min(r, s)))
-                    text = "0.0" if entry is None else self.writer.spell(entry)
-                    reads = frozenset() if entry is None else computed_names(entry)
-                    less = "".join(
-                        f" - L_{r}_{k} * L_{s}_{k} * D_{k}"
-                        for k in order
-                        if (r, k) in lower and (s, k) in lower
-                    )
-                    lines.append(
-                        CodeLine(f"L_{r}_{s} = l_{r} * l_{s} * ({text}{less}) / D_{s}", reads)
-                    )
+            for r in below[s]:
+                entry = entries.get((max(r, s), min(r, s)))
+                text = "0.0" if entry is None else self.writer.spell(entry)
+                reads = frozenset() if entry is None else computed_names(entry)
+                both = [k for k in left[r] if k in left[s]]
+                less = "".join(f" - L_{r}_{k} * L_{s}_{k} * D_{k}" for k in both)
+                lines.append(CodeLine(f"L_{r}_{s} = l_{r} * l_{s} * ({text}{less}) / D_{s}", reads))
         for r in order:
             value = right[r]
-            less = "".join(f" - L_{r}_{k} * w_{k}" for k in order if (r, k) in lower)
+            less = "".join(f" - L_{r}_{k} * w_{k}" for k in left[r])
             lines.append(
                 CodeLine(
                     f"w_{r} = l_{r} * ({self.writer.spell(value)}{less})", computed_names(value)
                 )
             )
         for r in reversed(order):
-            less = "".join(f" - L_{k}_{r} * hold_{k}" for k in order if (k, r) in lower)
+            less = "".join(f" - L_{k}_{r} * hold_{k}" for k in below[r])
             lines.append(CodeLine(f"hold_{r} = w_{r} / D_{r}{less}"))
         return lines
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        """The equations' entries, the order of elimination, and what it fills in."""
+        rows = range(len(self.rows))
+        sharing: dict[str, list[int]] = {}  # the rows that a body is in
+        for r in rows:
+            for name in self.rows[r].row:
+                sharing.setdefault(name, []).append(r)
+        near = {(r, s) for found in sharing.values() for r in found for s in found if s <= r}
+        entries = {
+            (r, s): value
+            for r, s in sorted(near)
+            if (value := self.weight(self.rows[r], self.rows[s])) is not None
+        }
+        order = self.order({key for key in entries if key[0] != key[1]})
+        place = {r: k for k, r in enumerate(order)}
+        # Which entries of L are not zero: those of the matrix, and what elimination fills in.
+        below: dict[int, set[int]] = {r: set() for r in order}
+        for r, s in entries:
+            if r != s:
+                first, then = sorted((r, s), key=place.__getitem__)
+                below[first].add(then)
+        for k in order:
+            for s in below[k]:
+                below[s] |= {r for r in below[k] if place[r] > place[s]}
+        left = {r: [k for k in order if r in below[k]] for r in order}
+        return Elimination(
+            entries, order, left, {r: sorted(below[r], key=place.__getitem__) for r in order}
+        )
 
     def order(self, links: Set[tuple[int, int]]) -> list[int]:
         """Return the order of elimination.
