@@ -297,9 +297,7 @@ def _object(
         started = time.perf_counter()
         notify("compiling, once for each chart and method ...")
         with _no_collections():
-            translator = translated(layout, entries, each=each)
-            hot = {name for name, own in translator.origins.items() if own in HOT}
-            made = llvm_text(translator.module)
+            made, hot = _written(layout, entries, each)
         vectors = entries[0].vectors
         content = (
             objects.compiled_at_once(made)
@@ -310,6 +308,15 @@ def _object(
             store.put(name, content)
         notify(f"compiled in {time.perf_counter() - started:.1f} s")
     return content
+
+
+def _written(
+    layout: BlockLayout, entries: Sequence[EntryPoint], each: bool
+) -> tuple[str, set[str]]:
+    """Return the text of functions on a block, and the names of the hot ones; no tree stays."""
+    translator = translated(layout, entries, each=each)
+    hot = {name for name, own in translator.origins.items() if own in HOT}
+    return llvm_text(translator.module), hot
 
 
 @contextlib.contextmanager

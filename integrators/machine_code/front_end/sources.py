@@ -6,9 +6,10 @@ import ast
 import functools
 import linecache
 import types
+import weakref
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -42,7 +43,6 @@ class NamesUsed:
     only_indexed: set[str]  # nothing but entries is used, none counted from the end
 
 
-@functools.lru_cache(maxsize=4096)  # a text is translated for each system, and most of them alike
 def names_of(definition: ast.AST) -> NamesUsed:
     """Return what a text does with its names, which nobody changes.
 
@@ -96,7 +96,7 @@ class Source:
     """The text of a function."""
 
     function: Any
-    lines: list[str]
+    file: _File
     definition: ast.FunctionDef
 
     @functools.cached_property
@@ -107,20 +107,29 @@ class Source:
     @property
     def names(self) -> NamesUsed:
         """What it does with its names."""
-        return names_of(self.definition)
+        return self.names_in(self.definition)
+
+    def names_in(self, part: ast.AST) -> NamesUsed:
+        """Return what a part of it does with its names."""
+        known = self.file.names
+        if (found := known.get(part)) is None:
+            known[part] = found = names_of(part)
+        return found
 
     def error(self, reason: str, node: ast.AST) -> TranslationError:
         """Return an error at a node of the tree."""
         number = getattr(node, "lineno", self.definition.lineno)
         place = f"{self.function.__code__.co_filename}, line {number}, in {self.function.__name__}"
-        return TranslationError(reason, place, self.lines[number - 1].strip())
+        return TranslationError(reason, place, self.file.lines[number - 1].strip())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _File:
     lines: list[str]
     definitions: Mapping[tuple[str, int], ast.FunctionDef]
     codes: Mapping[tuple[str, int], types.CodeType] | None  # None if it is in no file
+    # Of its parts: a text is translated for each system, and most of them alike.
+    names: dict[ast.AST, NamesUsed] = field(default_factory=dict)
 
     def is_of(self, code: types.CodeType) -> bool:
         """Return whether a function was made from this text, which a file may no longer have."""
@@ -130,7 +139,11 @@ class _File:
         return own is not None and _meaning(own) == _meaning(code)
 
 
-_files: dict[tuple[str, int], _File] = {}
+# Trees of long texts, those of many bodies, stay only while they are translated: a search for
+# garbage walks through all that stay, and that takes longer than to read the text again.
+_files: MutableMapping[tuple[str, int], _File] = {}
+_long_files: MutableMapping[tuple[str, int], _File] = weakref.WeakValueDictionary()
+LONG = 200_000  # characters
 
 
 def source_of(function: Callable[..., Any]) -> Source:
@@ -149,7 +162,7 @@ def source_of(function: Callable[..., Any]) -> Source:
     if node is None or not found.is_of(code):
         reason = "its text is not there, or has changed since it was loaded"
         raise TranslationError(reason, code.co_filename, code.co_name)
-    return Source(function, found.lines, node)
+    return Source(function, found, node)
 
 
 def _meaning(code: types.CodeType) -> list[Any]:
@@ -175,7 +188,9 @@ def _file(code: types.CodeType, names: dict[str, Any]) -> _File:
     lines = linecache.getlines(code.co_filename, names)
     text = "".join(lines)
     key = code.co_filename, hash(text)
-    if key not in _files:
+    files = _files if len(text) < LONG else _long_files
+    found = files.get(key)
+    if found is None:
         tree = ast.parse(text)
         definitions = {
             (node.name, min([node.lineno, *(each.lineno for each in node.decorator_list)])): node
@@ -183,8 +198,9 @@ def _file(code: types.CodeType, names: dict[str, Any]) -> _File:
         }
         given = linecache.cache.get(code.co_filename)
         in_file = given is None or len(given) == 1 or given[1] is not None
-        _files[key] = _File(lines, definitions, _codes(tree, code.co_filename) if in_file else None)
-    return _files[key]
+        codes = _codes(tree, code.co_filename) if in_file else None
+        files[key] = found = _File(lines, definitions, codes)
+    return found
 
 
 def _codes(tree: ast.Module, filename: str) -> dict[tuple[str, int], types.CodeType]:

@@ -20,7 +20,6 @@ from integrators.machine_code.front_end.expressions import (
     subscript,
     value,
 )
-from integrators.machine_code.front_end.sources import names_of
 from integrators.machine_code.front_end.values import (
     ArrayValue,
     FixedValue,
@@ -198,7 +197,7 @@ def _over_tuple(work: Work, name: str, whole: RecordValue, inside: Sequence[ast.
     parts = own(work, work.fresh(), whole)
     assert isinstance(parts, RecordValue)
     for each in inside:  # each of them is translated several times
-        work.assigned += names_of(each).assigned
+        work.assigned += work.source.names_in(each).assigned
     for part in parts.fields.values():
         work.scope[name] = part
         work.out += _block(work, inside)
