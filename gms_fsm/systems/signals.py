@@ -287,14 +287,15 @@ def piecewise_linear(t: float, times: Sequence[float], values: Sequence[float]) 
     low = first_after(t, times)
     if low == 0:
         return values[0]
+    before = values[low - 1]
     if low == len(times):
-        return values[low - 1]
+        return before
     t0, end = times[low - 1], times[low]
     halfway = t + 0.5 * (end - t)
     if t0 < t and (halfway <= t or halfway >= end):  # no number lies between them
         return values[low]
     share = (t - t0) / (end - t0)
-    return values[low - 1] + share * (values[low] - values[low - 1])
+    return before + share * (values[low] - before)
 
 
 def piecewise_slope(t: float, times: Sequence[float], values: Sequence[float]) -> float:
