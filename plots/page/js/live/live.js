@@ -62,6 +62,11 @@ function showRun(found, number) {
     load({ ...data, runs: [runOf(number, found, { label: "this run", short: "now" }, 0), runs[1]] });
     show(frame, found.stopped || first.told);
   }
+  tellRun();
+}
+
+// What is said of the run that is shown.
+function tellRun() {
   const wrong = movesLocked(runs[0]);
   if (wrong || $("#refused").dataset.of === "start") say($("#refused"), wrong);
   $("#refused").dataset.of = wrong ? "start" : "";
@@ -263,8 +268,9 @@ function beginLive() {
     const base = runOf(0, found, { label: "base run", short: "base", ghost: true }, 1);
     load({ ...data, runs: [runOf(0, found, { label: "this run", short: "now" }, 0), base] });
     if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
-    if (isChanged()) changed();
-    else showRun(found, 0);
+    if (isChanged()) { changed(); return; }
+    if (found.stopped) show(frame, found.stopped);
+    tellRun();
   }, begun);
   buildPanel(); // meanwhile
   const t = readAddress();
