@@ -44,6 +44,7 @@ PLACES = {
     "row": "buffers.out.row",
     "firings": "log.firings",
 }
+SHORT, DIGITS = 16, 10  # numbers that are not looked at, and decimals that are tried
 ENTRIES = ("record", "adapt", "show", "values")
 VALUES = (
     "more.values functions.p more.calm buffers.out.rows_t buffers.out.rows_y log.rows_mode "
@@ -118,7 +119,7 @@ class _LiveModule(RunModule):
         known = {
             "words": self.layout.words,
             "true": true,
-            "tables": _base64(np.array(tables)),
+            "tables": floats_text(tables),
             "columns": {name: _stored(each) for name, each in self.growing().items()},
             "sizes": {
                 "y": layout.y.size,
@@ -171,10 +172,28 @@ def _plain(each: Quantity, what: Mounted) -> str:
 
 def _stored(column: dict[str, Any]) -> dict[str, Any]:
     data = np.array(column.pop("data"), dtype=np.float64)
-    return {**column, "data": _base64(data)} if data.size else column
+    rows = data.reshape(-1, column["width"]) if column["width"] > 1 else [data]
+    return {**column, "data": [*map(floats_text, rows)]} if data.size else column
 
 
-def _base64(values: Any) -> str:
-    """Return floats as base64, in which a long run of A, zero bytes, is its length: ``-12-``."""
-    text = base64.b64encode(np.asarray(values, dtype="<f8").tobytes()).decode()
+def floats_text(values: Any) -> str | list[float]:
+    """Return floats as base64, in which a long run of A, zero bytes, is its length: ``-12-``.
+
+    Of evenly spaced decimal numbers, as times of a record are: the first and the step in units of
+    their last digit, how many of these are 1, and how many numbers there are.
+
+    Examples
+    --------
+    >>> floats_text([0.5, 0.0, 0.0, 0.0])
+    '-8-4D8-32-='
+    >>> floats_text([1.0 + k / 20.0 for k in range(100)])
+    [100.0, 5.0, 100.0, 100]
+    """
+    floats = np.asarray(values, dtype="<f8")
+    count, data = len(floats), floats.tobytes()
+    for unit in (10.0**digits for digits in range(DIGITS if count > SHORT else 0)):
+        first, after = map(float, np.rint(floats[:2] * unit))
+        if ((first + np.arange(count) * (after - first)) / unit).tobytes() == data:
+            return [first, after - first, unit, count]
+    text = base64.b64encode(data).decode()
     return re.sub("A{5,}", lambda found: f"-{len(found[0])}-", text)

@@ -6,13 +6,10 @@ part says what kind it is, such as ``["seen", 3]``, the fourth of the observed v
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from gms_fsm.exporters.live import LiveEngine
+from gms_fsm.exporters.live import LiveEngine, floats_text
 from gms_fsm.language import Name, Value, names_in
 from gms_fsm.systems.signals import Corners
 from gms_fsm.traces.trace import Trace
@@ -161,7 +158,7 @@ class _Terms:
         if name in system.signals or driven:
             signal = self.given[name].signal
             if isinstance(signal, Corners):
-                return pool.add("corners", *map(_floats, (signal.times, signal.values)))
+                return pool.add("corners", *map(floats_text, (signal.times, signal.values)))
             tree = self.given[name].tree
             assert tree is not None
             return self.computed(tree)
@@ -186,7 +183,3 @@ def _system(stored: Mapping[str, Any], trace: Trace, terms: _Terms) -> dict[str,
     ]
     values = [{**each, "column": terms.term(each["name"])} for each in stored["values"]]
     return {**stored, "bodies": bodies, "values": values}
-
-
-def _floats(values: Any) -> str:
-    return base64.b64encode(np.asarray(values, dtype="<f8").tobytes()).decode()

@@ -5,8 +5,13 @@ const GROWING = { // columns by what there is one entry of
   firings: ["log_t", "log_machine", "log_edge", "log_numbers"],
 };
 
-function floats(text = "") {
-  const letters = text.replace(/-(\d+)-/g, (_, count) => "A".repeat(count));
+// Floats as gms_fsm.exporters.live has written them.
+function floats(stored) {
+  if (typeof stored !== "string") {
+    const [first, step, unit, count] = stored;
+    return new Float64Array(count).map((_, k) => (first + k * step) / unit);
+  }
+  const letters = stored.replace(/-(\d+)-/g, (_, count) => "A".repeat(count));
   const bytes = Uint8Array.fromBase64?.(letters) ?? Uint8Array.from(atob(letters), (letter) => letter.charCodeAt(0));
   return new Float64Array(bytes.buffer);
 }
@@ -20,7 +25,7 @@ class Engine {
     Object.assign(this, { known, image, make: functions, tables: floats(known.tables), rooms: { ...ROOMS } });
     const width = GROWING.rows.reduce((sum, name) => sum + known.columns[name].width, 0);
     this.rooms.rows = Math.max(ROOMS.rows, Math.floor(ROWS_IN_WORDS / width));
-    this.fixed = Object.fromEntries(Object.entries(known.columns).map(([name, { data }]) => [name, floats(data)]));
+    this.fixed = Object.fromEntries(Object.entries(known.columns).map(([name, { data = [] }]) => [name, data.map(floats)]));
     this.build();
   }
 
@@ -38,7 +43,8 @@ class Engine {
     F.set(tables);
     for (const [name, { offset, width, lengths }] of Object.entries(columns)) {
       [places[name], count(name), width].slice(0, 1 + lengths).forEach((u, k) => { F[this.block + offset + k] = u; });
-      F.set(fixed[name], places[name]);
+      let place = places[name];
+      for (const part of fixed[name]) { F.set(part, place); place += part.length; }
     }
     for (let k = 0; k < this.image.length; k += 2) F[this.block + this.image[k]] = this.image[k + 1];
     for (const place of bytes) B[8 * this.block + place] = 1;
