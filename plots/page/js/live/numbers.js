@@ -94,6 +94,7 @@ hooks.clause = (cell, contact, clause) => {
   const dialFor = (name) => (Object.hasOwn(contact.parameters, name) ? dials.get(contact.name ? `${contact.name}.${name}` : name) : undefined);
   const known = [...namesIn(clause.tree)].filter((name) => dialFor(name) && !Number.isNaN(dialFor(name).value));
   for (const name of known) {
+    make("wbr", cell);
     const dial = dialFor(name), label = make("label", cell, known.length > 1 ? ` ${name} ` : " ", { class: "in-guard" });
     const box = make("input", label, "", { type: "text", size: 7, inputmode: "decimal", spellcheck: "false", autocomplete: "off", "aria-label": `${name} in this guard` });
     box.addEventListener("change", () => dials.get(dial.name).type(box.value));
