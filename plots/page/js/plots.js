@@ -108,9 +108,11 @@ class TimePlots {
   }
 
   // Lines as thin as they can be, solid, and with the extremes of each column of pixels only. Then as they should be again.
+  // The ribbons are painted when they change, not with all else that does.
   sketch(on) {
     if (Boolean(this.sketched) === on) return;
     this.sketched = on;
+    this.ribbons?.classList.toggle("sketched", on);
     for (const { plot } of this.plots) {
       for (const each of plot.series.slice(1)) {
         if (on) Object.assign(each, { fine: { width: each.width, dash: each.dash } }, { width: 1, dash: [] });
