@@ -398,7 +398,7 @@ def test_a_sweep_of_another_contact_has_its_quantities(live: Any) -> None:
 
 def test_bars_say_how_much_each_number_matters(live: Any) -> None:
     scenario, page = live_scenario("pulled_mass"), live("pulled_mass")
-    page.evaluate("go(lastAt(frames.t, 0.55 * frames.t[last]))")
+    page.evaluate("go(lastAt(frames.t, 0.55 * frames.t[last])); lookLater()")
     wait(page, "document.querySelector('#matters').textContent !== ''")
     t, names = page.evaluate("[frames.t[frame], [...matters.found.keys()]]")
     found = page.evaluate("[...matters.found.values()].map(({ slope, same }) => [slope, same])")
