@@ -40,7 +40,7 @@ LIMIT = math.sqrt(ENDLESS)  # where locks contradict each other a force has no l
 # --------------------------------------------------------------------------- the text
 def _text(plan: ProgramPlan) -> str:
     printer = _AdaptingPrinter(plan)
-    lines = [f"# What follows from the numbers of {visible(plan.title)}"]
+    lines = [f"# What follows from the numbers of {visible(plan.title)}", printer.marks]
     for k, bank in enumerate(plan.read.banks):
         own = frozenset(n for n in bank.chart.parameter_names if of(bank.name, n) in plan.read.own)
         made = scale_text(bank.chart, f"scale_{k}", own, curved=printer.is_curved(bank))

@@ -24,7 +24,10 @@ from gms_fsm.traces.coverage.counting import FiredEdges, LogCounts, of_tables
 from tests.corpus import CORPUS, FAILING, FEW, QUICK, Run, each, in_turn, outcome, run, trace
 from tests.helpers import FASTEST, same_logs
 
-SOME = (*QUICK, "fig. 3, slipping, published", "every kind of contact", "divided by zero")
+SOME = (
+    *(*QUICK, "fig. 3, slipping, published", "every kind of contact", "divided by zero"),
+    "system pushed against a stop",  # its guards read a force without limit
+)
 
 
 def counted(one: Run, engine: str) -> tuple[Coverage, Trace]:

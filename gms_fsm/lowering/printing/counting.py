@@ -187,7 +187,7 @@ class _CountPrinter(LockFunctions):
                 branches[bank.states[group.state]] += self.counted(bank, group, first, apart.start)
             lines += self.loop(bank.index, "live", (), branches)
         head = [f"# {visible(self.plan.title)}: counts what guards see"]
-        head += [numbered(states.values()) for states in self.names.states]
+        head += [*(numbered(states.values()) for states in self.names.states), self.marks]
         code = self.function(
             f"count(t, y, mode, p, {self.own_name('counts')}, {self.own_name('near')})",
             "Count the truths of the guards of each element, and how near their sides came.",

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from gms_fsm.lowering.printing.forces import ForceWriter
 from gms_fsm.lowering.printing.lines import CodeLine
+from gms_fsm.lowering.printing.names import MARKS, REASONS
 
 
 class LockFunctions(ForceWriter):
     """Writes these functions; without locks they are empty."""
+
+    @property
+    def marks(self) -> str:
+        """The numbers of the loop that texts call by names."""
+        marks = {**REASONS, **(MARKS if self.locking else {})}
+        return f"{', '.join(marks)} = {', '.join(map(str, marks.values()))}  # marks of the loop"
 
     def moved_locks(self) -> list[CodeLine]:
         """Write that the force on a locked contact that an impulse has moved has no limit."""

@@ -32,7 +32,7 @@ from gms_fsm.lowering.printing.lines import (
     reads_of,
 )
 from gms_fsm.lowering.printing.lock_functions import LockFunctions
-from gms_fsm.lowering.printing.names import MARKS, REASONS, computed_names
+from gms_fsm.lowering.printing.names import computed_names
 from gms_fsm.lowering.printing.plan import Gradient, Pair, ProgramPlan, both_sides
 from gms_fsm.systems.reading.assembly import Bank, ContactEdge, of
 from integrators import LIVE
@@ -78,8 +78,7 @@ def python(plan: ProgramPlan) -> str:
         lines.append(f"{numbered(states.values())}  # states{whose}")
     if any(plan.names.edges):
         lines.append(f"{numbered(edge for each in plan.names.edges for edge in each)}  # edges")
-    marks = {**REASONS, **(MARKS if printer.locking else {})}
-    lines.append(f"{', '.join(marks)} = {', '.join(map(str, marks.values()))}  # marks of the loop")
+    lines.append(printer.marks)
     for function in (
         printer.switch(),
         printer.act(),
