@@ -40,7 +40,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.startswith(SLOW_EXAMPLES):
             item.add_marker(pytest.mark.slow)
-        if every := item.get_closest_marker("every"):
+        every = item.get_closest_marker("every")
+        if every and not item.get_closest_marker("matrix"):
             of = item.nodeid.partition("[")[0]
             if seen[of] % every.args[0]:
                 item.add_marker(pytest.mark.matrix)

@@ -70,7 +70,6 @@ def check(name: str, engine: str) -> None:
     same_logs(end, whole)
 
 
-@pytest.mark.every(2)
 @each(CORPUS, SOME)
 def test_a_run_counts_its_rows(name: str) -> None:
     check(name, FASTEST)

@@ -36,13 +36,20 @@ def problems(figure: Figure, smallest: float) -> list[str]:
         inside = box.x0 > -PIXEL and box.x1 < whole.x1 + PIXEL
         if not (inside and box.y0 > -PIXEL and box.y1 < whole.y1 + PIXEL):
             found.append(f"leaves the figure: {text.get_text()}")
-    for (a, first), (b, second) in combinations(texts, 2):
+    for (a, first), (b, second) in combinations([(t, _inked(t, box)) for t, box in texts], 2):
         wide = min(first.x1, second.x1) - max(first.x0, second.x0)
         tall = min(first.y1, second.y1) - max(first.y0, second.y0)
         # Boxes have the height of a line; letters need less.
         if wide > PIXEL and tall > PIXEL + 0.12 * min(first.height, second.height):
             found.append(f"overlap: {a.get_text()} and {b.get_text()}")
     return found
+
+
+def _inked(text: Text, box: Bbox) -> Bbox:
+    """Return a box without the blanks that a level text begins with."""
+    whole = text.get_text()
+    blanks = 0 if text.get_rotation() else len(whole) - len(whole.lstrip())
+    return Bbox.from_extents(box.x0 + blanks / len(whole) * box.width, box.y0, box.x1, box.y1)
 
 
 def _small(text: Text, smallest: float) -> bool:

@@ -332,7 +332,7 @@ def unfolded_states(ax: Axes, part: Unfolded) -> Artists:
     long = BOLD * LETTER * (len(first) + len((*texts, "")[0]) / 2 + 2)
     below = bool(texts) and (upright or long > wide * float(part.gaps[0]))
     ax.set_xlabel(
-        "micro-step at each instant (0: before the first firing); time",
+        "micro-step (0: before the first firing); time",
         labelpad=inches(33 + lower if below else 20),
     )
     low = -31 - lower if below else -18
