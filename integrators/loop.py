@@ -198,7 +198,7 @@ def run_to_event(
                 w = listed(relations, memory.active)
                 often = _often_changed(motion, plan, now, w, sliding, memory, scratch)
                 let_go_in_time(on, now, relations)
-            if len(memory.was) > 0 and (memory.status == CROSSED or memory.status == REACHED):
+            if len(memory.was) > 0 and memory.status in (REACHED, CROSSED, FULL):
                 arrived(switch, plan, now, memory.was, memory.jolt, memory.status == CROSSED, p)
             event = _end_arc(plan, now, memory, often)
         elif phase == JUMPING:

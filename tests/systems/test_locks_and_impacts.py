@@ -46,6 +46,19 @@ def kinetic(trace: Trace, masses: Mapping[str, float], row: int) -> float:
 # --------------------------------------------------------------------------- impacts
 
 
+def test_by_steps_an_impact_elsewhere_disturbs_no_arrest() -> None:
+    """A sled that friction has slowed down since the start has not jumped."""
+    system = System(
+        "a ball and a sled",
+        bodies=(mass("ball", 1.0), mass("sled", 1.0)),
+        contacts=(stop("wall", "v_ball", x_s=1.0), pad("pad", "v_sled", 1.0, 1.5)),
+    )
+    start = {"v_ball": 1.0, "v_sled": 1.005, "pad.states": ["forward"]}
+    trace = run(system, 2.0, initial=start, events="step", method="rk4", step=0.01)
+    assert edges(trace) == [("wall", "bounce"), ("pad", "arrest_forward")]
+    assert trace.transitions.t == pytest.approx([1.0, 1.01], abs=1e-12)
+
+
 @pytest.mark.parametrize("kind", ["karnopp", "modelica", "stiction"])
 def test_an_impact_turns_every_stiction_of_the_zoo_round(kind: str) -> None:
     entry = CHARTS[kind]
