@@ -49,7 +49,7 @@ def only_new(kinds: list[int], edges: list[int], heard: list[int]) -> None:
     """Drop edges that wait for a tick, or an event, which their machine has answered."""
     for i in range(len(edges)):
         edge = max(edges[i], -2 - edges[i])  # one that is refused, too
-        if edge >= 0 and kinds[edge] & heard[i] > 0:
+        if edge >= 0 and kinds[edge] & heard[i] >= TICK:
             edges[i] = -1
 
 

@@ -238,6 +238,38 @@ def test_nobody_misses_an_event_or_a_tick_while_others_go_first(engine: str) -> 
     assert (log.t[6:11] == 0.7).all()
 
 
+@pytest.mark.parametrize("engine", sorted({FASTEST, "ifelse"}))
+def test_one_impulse_after_another_waits_for_nobody(engine: str) -> None:
+    """Also where another machine hears an event meanwhile, and then has no edge any more."""
+    struck = Chart(
+        "struck",
+        inputs=("v", "c"),
+        states=(State("free"), State("bounced"), State("slowed")),
+        transitions=(
+            Transition("bounce", "free", "bounced", "c > 0.5", actions={"v": "-0.5 * v"}),
+            Transition("slow", "bounced", "slowed", "v < 0", actions={"v": "0.1 * v"}),
+        ),
+        outputs={"F": "0"},
+    )
+    calls = Transition("call", "off", "on", "t >= 1", emit="called")
+    answers = Transition("answer", "off", "on", "w > 0", event="called")
+    clock = Chart(
+        "clock", ("t",), states=(State("off"), State("on")), transitions=(calls,), velocities=()
+    )
+    other = Chart(
+        "other", ("w",), states=(State("off"), State("on")), transitions=(answers,), velocities=()
+    )
+    system = System(
+        "struck twice",
+        bodies=(mass("m", 1.0),),
+        contacts=(Contact("hit", struck, v="v_m", inputs={"c": "is_in(clock.on)"}),),
+        supervisors=(Supervisor("other", other, inputs={"w": "v_m"}), Supervisor("clock", clock)),
+    )
+    log = simulate(system, 3.0, initial={"v_m": 1.0}, engine=engine).transitions
+    assert log.edge.tolist() == ["call", "bounce", "slow"]
+    assert log.t.tolist() == [1.0, 1.0, 1.0]
+
+
 def test_a_timetable_with_a_period_sends_at_its_ticks() -> None:
     hand = Supervisor("hand", timetable({"oil": 1.0}), period=0.3)
     log = simulate(System("by hand", supervisors=(hand,)), 3.0).transitions
