@@ -123,7 +123,7 @@ def failure(event: int, b: Buffers, relations: list[str]) -> HybridError:
         often = [name for r, name in enumerate(names) if memory.changes[r] >= MOST_SWITCHES]
         return Livelock(*scene, None, MOST_SWITCHES, often)
     if event == loop.ENTANGLED:
-        return Entangled(*scene, sorted(k for k, on in enumerate(b.sliding.flags) if on))
+        return Entangled(*scene, sorted(map(int, b.sliding.which[: b.sliding.count])))
     w = listed(b.relations, memory.active)
     undefined = [
         name for r, name in enumerate(relations) if r in w.active and w.start[r] != w.start[r]

@@ -48,6 +48,7 @@ from gms_fsm.systems.signals import Signal, as_signal
 from gms_fsm.traces.failures import (
     LivelockError,
     NotFiniteError,
+    NotUniqueError,
     SignalEndError,
     SimulationError,
     StepLimitError,
@@ -816,6 +817,10 @@ FAILURES: dict[str, _Failure] = {
     ),
     "the record ends": (SignalEndError, _on(SIGNED, Prescribed(RECORD), 61.0)),
     "the record ends, rk4": (SignalEndError, _on(SIGNED, Prescribed(RECORD), 61.0, **_RK4)),
+    "both sides lead away": (
+        NotUniqueError,
+        _on(coulomb("-F_c * sgn(v)"), Slider(1.0, "0.1"), 1.0),
+    ),
     "too many steps": (StepLimitError, _on(*PULLED, 60.0, max_steps=300)),
     "random system 7": (LivelockError, _random(7)),
 }

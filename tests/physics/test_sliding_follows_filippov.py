@@ -340,6 +340,17 @@ def test_edges_of_both_states_leave_it(source: str, first: bool) -> None:
     assert trace.z[-1, 0] == pytest.approx(0.0, abs=1e-15)
 
 
+def test_one_element_leaves_and_the_other_slides_on() -> None:
+    off = Transition("switch_off", ("below", "above"), "off", guard="t > 2 and k > 1.5")
+    chart = relay().chart
+    chart = replace(chart, transitions=(*chart.transitions, off))
+    for k in ([2.0, 1.0], [1.0, 2.0]):
+        trace = run([-0.1, -0.2], ChartModel(chart, {"k": k}, n=2))
+        ends = [each.t_end for each in sorted(trace.sliding, key=lambda each: str(each.surface))]
+        assert ends == pytest.approx([2.0 if each == 2.0 else LEAVES for each in k], abs=1e-12)
+        assert sorted(trace.transitions.edge) == ["rise", "rise", "switch_off"]
+
+
 def test_a_curved_surface_that_moves_is_followed() -> None:
     """p^2 + q^2 = 1 + 0.1 t, while p grows below and decays above."""
     bent = ("p * p + q * q > 1 + 0.1 * t", "p * p + q * q < 1 + 0.1 * t")

@@ -43,6 +43,7 @@ SAID = {
     "self-loop": ["element 2", "'again'", "from stick to stick", "z >= s"],
     "blow-up": ["step size", "Radau", "rtol", "t = 1.0"],
     "too many steps": ["max_steps = 300 steps"],
+    "both sides lead away": ["it starts at v = 0, from where the flows on both sides lead away"],
     "a guard of NaN": ["compares NaN", "(x = 0, z1 = 0, z2 = 0)"],
     "an action of NaN": ["z of element 1 is not finite here", "assigned to it: [1 / (z - z)]"],
     "root of a negative": ["signal 'v', [0.1*sqrt(3 - t)], is not finite at t = 3 s"],
