@@ -323,13 +323,27 @@ def _close(
 
     Leaves the margins at the point before the change in ``search.rights[0]``, for `_search`.
     """
+    if len(w.truth) > MANY and len(w.active) > MANY:
+        return _close_few(path, low, high, left, right, w, resolution)
     search = w.search
-    if len(w.truth) <= MANY or len(w.active) <= MANY:
-        copy_margins(w, left, search.low)
-        copy_margins(w, right, search.high)
-        low, high = _bracket(path, low, high, w, resolution)
-        copy_margins(w, search.low, search.rights[0])
-        return low, high
+    copy_margins(w, left, search.low)
+    copy_margins(w, right, search.high)
+    low, high = _bracket(path, low, high, w, resolution)
+    copy_margins(w, search.low, search.rights[0])
+    return low, high
+
+
+def _close_few(
+    path: Path,
+    low: float,
+    high: float,
+    left: Vector,
+    right: Vector,
+    w: Watched,
+    resolution: float,
+) -> tuple[float, float]:
+    """Do the same while looking only at relations that have changed."""
+    search = w.search
     while True:
         few = _changed(w, right)
         copy_margins(few, left, search.low)

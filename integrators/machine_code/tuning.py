@@ -16,6 +16,7 @@ NOT_INLINE = [
     "arm_on", "drop", "entangled", "let_go", "look_back", "look_held", "release", "_ask", "_bears",
     "_along", "arrive", "fix", "slide_in_lanes", "margins_in_lanes", "_await",
     "_combine", "crossed", "_is_far", "leave", "let_go_in_time", "_values",
+    "aimed_step", "_changed", "_close_few", "_first_step", "steps_to_change",
 ]  # fmt: skip
 # A step calls the flow seven times. Inline, the slopes stay in registers: a tenth of the time. Each
 # row is observed: a tenth of the time, too.
