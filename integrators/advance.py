@@ -299,7 +299,9 @@ def advance(
 def _next_end(plan: RunPlan, now: Now, out: Output) -> tuple[float, float, float]:
     """Return the end of the next step, when it is seen, and the significant difference of times.
 
-    It follows the grid or the controller, but not past a stop, and avoids a sliver before one.
+    It follows the grid or the controller, but not past a stop, and avoids a sliver before one: two
+    equal steps have a smaller error than a long and a short one. Not before the end of the run, of
+    which what comes before must not know.
     """
     t, control = now.t, plan.control
     if control.step > 0.0:
@@ -310,6 +312,8 @@ def _next_end(plan: RunPlan, now: Now, out: Output) -> tuple[float, float, float
     tick = TICK * max(abs(t), abs(t_new))
     if t_new + tick >= limit:
         t_new = limit
+    elif not control.step > 0.0 and t_new + (t_new - t) > limit and limit < plan.t_end:
+        t_new = t + 0.5 * (limit - t)
     return t_new, min(t_new, now.seen), tick
 
 
@@ -336,8 +340,9 @@ def _assess_step(
     factor = next_factor(root, now.error_before)
     if rejected:
         factor = min(factor, 1.0)
-    # A step cut short by a stop says little about the step after it.
-    cut_short = h < now.h and not rejected
+    # A step cut short by a stop says little about the step after it. One that is shorter by the
+    # rounding of its end is not cut short.
+    cut_short = h + tick < now.h and not rejected
     now.h = max(now.h, h * factor) if cut_short else h * factor
     now.error_before = memory_of(root)
     return ACCEPTED

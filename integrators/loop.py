@@ -450,11 +450,19 @@ def _first_step(
     scratch: Scratch,
     memory: Memory,
 ) -> float:
-    """Return the first step of an arc: to the next change if that is near, and many are watched."""
+    """Return the first step of an arc: to the next change if that is near, and many are watched.
+
+    Where something ticked and nothing switched the steps stay as long as they were: a controller
+    changes little, and one that changes much costs a rejected step.
+    """
     if len(relations.truth) > MANY and memory.active > MANY and now.h > 0.0:
         aimed = aimed_step(motion, now, 0.1 * now.h, listed(relations, memory.active))
         if aimed < 0.5 * now.h:
             return aimed
+    last = memory.jump - 1
+    ticked = last >= 0 and plan.jumps[last] == now.t and plan.ticks[last] > 0
+    if ticked and memory.microstep == 0 and now.h > 0.0:
+        return now.h
     knot, order = knot_after(plan, now, out), plan.method.error_order
     return starting_step(motion, order, plan.control, now, knot, scratch)
 

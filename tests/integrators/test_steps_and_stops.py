@@ -141,19 +141,27 @@ def test_the_step_after_a_rejected_one_does_not_grow_at_once() -> None:
     assert run.to(100.0, h=0.05, steps=1)[2] == pytest.approx(0.5)  # but the next one may grow
 
 
-def test_a_narrowly_accepted_step_is_followed_by_a_shorter_one() -> None:
+@pytest.mark.parametrize("start", [0.0, 7.0])  # later on, a step's end is rounded
+def test_a_narrowly_accepted_step_is_followed_by_a_shorter_one(start: float) -> None:
     narrow = 0
     for i in range(60):
         h = 0.04 + 0.001 * i
-        run = _Run(lambda t, y: math.cos(40.0 * t))
-        _, t, h_next, memory = run.to(10.0, h=h, steps=1)
+        run = _Run(lambda t, y: math.cos(40.0 * (t - start)), t=start)
+        _, t, h_next, memory = run.to(start + 10.0, h=h, steps=1)
         assert memory <= 1.0
         root = memory * memory  # of the error
-        if t == h and root > 0.97:
+        if t == start + h and root > 0.97:
             narrow += 1
-            assert h_next == pytest.approx(h * next_factor(root, 1.0), rel=1e-14)
+            assert h_next == pytest.approx(h * next_factor(root, 1.0), rel=1e-12)
             assert h_next < h
     assert narrow >= 1
+
+
+def test_the_last_two_steps_before_a_stop_are_equal_but_not_before_the_end_of_the_run() -> None:
+    run = _Run()
+    assert run.to(1.0, h=0.7, steps=1)[1] == 0.5
+    assert run.to(1.0, h=0.7, steps=1)[1] == 1.0
+    assert run.to(100.0, h=70.0, steps=1)[1] == 71.0
 
 
 def test_the_controller_remembers_the_last_error_but_never_that_there_was_none() -> None:

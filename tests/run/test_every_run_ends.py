@@ -161,7 +161,7 @@ def test_the_steps_of_a_run_are_limited() -> None:
 
 
 def test_attempts_in_vain_count_too_in_every_engine() -> None:
-    model, rig = stick_slip("signed"), Slider(1.0, "3*sin(2*t) + 0.5*sin(31*t)")
+    model, rig = stick_slip("signed"), Slider(1.0, "3*sin(2*t) + 3*tanh(200*sin(9*t))")
     ends = []
     for engine in BOTH:
         how = {"max_steps": 700, "method": "bs23", "rtol": 1e-7, "engine": engine}

@@ -7,6 +7,7 @@ import pytest
 
 from gms_fsm import simulate
 from gms_fsm.app.scenario import load_scenario
+from gms_fsm.charts import CHARTS
 from gms_fsm.systems.system import Body, Contact, Sampled, System
 from tests.helpers import stick_slip
 
@@ -38,6 +39,22 @@ def test_updates_run_in_written_order_and_see_the_results_before_them() -> None:
 def test_a_run_that_starts_later_ticks_from_its_start() -> None:
     trace = simulate(counting(0.25), 3.0, engine="ifelse", t_start=2.1)
     assert sorted(set(trace.value("at").tolist())) == [2.1 + k * 0.25 for k in range(4)]
+
+
+def test_steps_stay_as_long_across_a_tick_at_which_nothing_switches() -> None:
+    system = System(
+        "pulled and damped",
+        bodies=(Body("mass", inertia="m", force="u - k * (x - 0.2 * t)"),),
+        contacts=(Contact("pad", CHARTS["stiction"], {"F_c": 0.01, "F_s": 0.015, "b": 0.1}),),
+        numbers={"m": 1.0, "k": 30.0},
+        sampled=(Sampled("damper", period=0.1, updates={"u": "1 - 3 * v"}),),
+    )
+    trace = simulate(system, 3.0, engine="ifelse")
+    assert [each.t for each in trace.transitions] == [0.0]
+    steps = np.diff(trace.t)[trace.t[:-1] > 0.3]
+    steps = steps[steps > 1e-9]  # rows on both sides of a tick are a clock tick apart
+    assert len(steps) > 40
+    assert steps.min() > 0.2 * steps.max()
 
 
 # --------------------------------------------------------------------------- a servo

@@ -350,13 +350,13 @@ def _labels(held: Places[Value], names: QuantityNames) -> dict[Value, str]:
 
 
 def _acceleration(read: Assembly, body: str) -> Value:
-    """Return the acceleration of a free body over the forces of its contacts."""
+    """Return the acceleration of a free body: its product is there sooner than a quotient."""
     tree = read.forces[body]
     for bank in read.banks:
         for force, row in zip(bank.forces, bank.jacobian, strict=False):  # a supervisor has none
             if body in row:
                 tree = Binary("-", tree, times(row[body], Name(force)))
-    return Binary("/", tree, read.inertias[body])
+    return Binary("*", tree, Binary("/", Number(1.0), read.inertias[body]))
 
 
 def times(coefficient: Value, value: Value) -> Value:
