@@ -35,6 +35,8 @@ def shown(value: object) -> str:
     >>> shown("abc")
     "'abc'"
     """
+    if type(value) is str:
+        return cut(repr(value))
     try:
         text = repr(_plain(value))
         if "\n" in text:

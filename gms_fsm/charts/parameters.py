@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 FloatArray: TypeAlias = NDArray[np.float64]
 
 ANY = "finite"  # the rule that applies to every number
+FEW = 16  # numbers that are looked at one by one in less time than NumPy's functions take
 _HOLDS: Mapping[str, Callable[[Any, Any], Any]] = {
     ">=": operator.ge,
     "<=": operator.le,
@@ -73,6 +74,20 @@ def bounds_of(rule: str) -> tuple[Bound, ...]:
     if rule == ANY:
         return ()
     return tuple(_bound(part.strip(), rule) for part in rule.split(" and "))
+
+
+@functools.lru_cache(maxsize=256)
+def _limits(rule: str) -> tuple[tuple[Callable[[Any, Any], Any], float], ...]:
+    """Return the comparisons with numbers in a rule."""
+    return tuple(
+        (_HOLDS[each.op], each.limit) for each in bounds_of(rule) if not isinstance(each.limit, str)
+    )
+
+
+@functools.lru_cache(maxsize=256)
+def _relative(rule: str) -> tuple[Bound, ...]:
+    """Return the comparisons with other parameters in a rule."""
+    return tuple(bound for bound in bounds_of(rule) if isinstance(bound.limit, str))
 
 
 def _bound(text: str, rule: str) -> Bound:
@@ -259,6 +274,12 @@ def adapted(parameter: Parameter, chart: Chart) -> Parameter:
 # --------------------------------------------------------------------------- checks
 def checked_scalar(name: str, value: Any, rule: str) -> float:
     """Return a value as a float if it is finite and satisfies a rule."""
+    if type(value) is float and math.isfinite(value):
+        for holds, limit in _limits(rule):
+            if not holds(value, limit):
+                break
+        else:
+            return value
     try:
         if isinstance(value, str | bytes):  # float("100") is a number
             raise TypeError
@@ -275,6 +296,14 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
         if not isinstance(bound.limit, str) and not bound.holds(number, bound.limit):
             raise ParameterError(f"it must be {bound.text}", place=name, value=number)
     return number
+
+
+def finite_numbers(given: Mapping[str, Any], here: str) -> dict[str, float]:
+    """Return numbers by name as floats if all of them are finite."""
+    for value in given.values():
+        if type(value) is not float or not math.isfinite(value):
+            return {name: checked_scalar(f"{here}: {name}", u, ANY) for name, u in given.items()}
+    return dict(given)
 
 
 def check_rules(parameters: Sequence[Parameter], here: str) -> None:
@@ -323,9 +352,16 @@ def checked_array(name: str, values: ArrayLike, n: int | None, rule: str) -> Flo
             f"{name} has {array.size} entries, but there are {n} elements",
             advice="give one number for each element",
         )
-    bounds = [bound for bound in bounds_of(rule) if not isinstance(bound.limit, str)]
-    sound = all(bool(bound.holds(array, bound.limit).all()) for bound in bounds)
-    if not (sound and np.isfinite(array).all()):
+    if array.size <= FEW:
+        numbers = array.tolist()
+        sound = all(map(math.isfinite, numbers))
+        for holds, limit in _limits(rule):
+            for number in numbers:
+                sound = sound and holds(number, limit)
+    else:
+        sound = all(bool(holds(array, limit).all()) for holds, limit in _limits(rule))
+        sound = sound and bool(np.isfinite(array).all())
+    if not sound:
         for i, number in enumerate(array.tolist()):  # the first one is refused
             checked_scalar(f"{name}[{i}] (element {i + 1})", number, rule)
     array.setflags(write=False)
@@ -369,22 +405,23 @@ def checked_values(
     known = {each.name: each for each in parameters}
     checked = {name: _checked(each, values[name], n) for name, each in known.items()}
     for each in known.values():
-        for bound in each.bounds:
-            if isinstance(bound.limit, str) and bound.limit in known:
-                _compare(each, known[bound.limit], bound, checked)
+        for bound in _relative(each.rule):
+            if (other := known.get(str(bound.limit))) is not None:
+                _compare(each, other, bound, checked)
     return checked
 
 
 def _checked(parameter: Parameter, value: Any, n: int) -> float | FloatArray:
     name, rule = parameter.name, parameter.rule
-    if not _is_list(value):
+    if not is_list(value):
         return checked_scalar(name, value, rule)
     if not parameter.per_element:
         raise ParameterError("it must be a number, one for all elements", place=name, value=value)
     return checked_array(name, value, n, rule)
 
 
-def _is_list(value: Any) -> bool:
+def is_list(value: Any) -> bool:
+    """Return whether a value is not one number, but several."""
     if isinstance(value, float):
         return False
     try:

@@ -129,7 +129,7 @@ class Stribeck:
     @property
     def flat(self) -> float:
         """Speed [m/s] beyond which the curve is F_c to the last bit."""
-        return flat_of(self.F_c, self.F_s, self.v_s, self.delta)
+        return _flat(self.F_c, self.F_s, self.v_s, self.delta)
 
     def __call__(self, v: ArrayLike) -> FloatArray:
         """Return s(v) [N] for velocities v [m/s] of any shape, computed exactly as in a run."""
@@ -164,6 +164,9 @@ def flat_of(F_c: float, F_s: float, v_s: float, delta: float) -> float:
         return INFINITY
     width: float = elementary.power(elementary.log(max(share, 1.0)), 1.0 / delta)
     return width * v_s * (1.0 + 1e-9)
+
+
+_flat = functools.lru_cache(maxsize=256)(flat_of)  # a curve is asked again for each run
 
 
 @functools.cache

@@ -270,6 +270,26 @@ def later(kind: type[Any], make: Callable[[], Any], **known: Any) -> Any:
     return new
 
 
+def copied(it: Any, **others: Any) -> Any:
+    """Return an object of a dataclass with other fields, unchecked: all of them fit together.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Run:
+    ...     v: float
+    ...     w: float = 0.5
+    >>> copied(Run(0.2), w=1.0)
+    Run(v=0.2, w=1.0)
+    """
+    new, own, fields = object.__new__(type(it)), vars(it), it.__dataclass_fields__
+    if len(own) > len(fields):  # there are properties that have been computed
+        own = {name: own[name] for name in fields}
+    vars(new).update(own, **others)
+    return new
+
+
 # --------------------------------------------------------------------------- names
 def nearest(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
     """Return the known name most like a wrong one, whatever its case; empty if none is.

@@ -7,6 +7,7 @@ from dataclasses import fields
 from typing import Any, Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 T = TypeVar("T")
 Kind = TypeVar("Kind", bound=type)
@@ -77,3 +78,24 @@ class ByIdentity(Generic[T]):
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ByIdentity) and other.it is self.it
+
+
+class ByBits:
+    """An array in a key; the hash is that of its ends, since that of all numbers takes too long."""
+
+    def __init__(self, it: Any) -> None:
+        self.it = it
+
+    def __hash__(self) -> int:
+        return hash((self.it.shape, *self.it[:1].tolist(), *self.it[-1:].tolist()))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ByBits) and are_same(self.it, other.it)
+
+
+def are_same(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    """Return whether two arrays have the same bits."""
+    if one is other:
+        return True
+    alike = one.shape == other.shape and one.dtype == other.dtype
+    return alike and one.tobytes() == other.tobytes()

@@ -17,10 +17,11 @@ from gms_fsm.charts.parameters import (
     FloatArray,
     checked_array,
     checked_scalar,
+    is_list,
 )
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError
-from gms_fsm.foundation.arguments import nearest, refusing, unknown
+from gms_fsm.foundation.arguments import copied, nearest, refusing, unknown
 from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.foundation.equality import by_value
 
@@ -86,10 +87,11 @@ class GMSParameters:
         v_c: float,
         weights: ArrayLike | None = None,
     ) -> None:
-        n = checked_array("k", k, None, RULES["k"]).size
-        given = {"k": k, "sigma": sigma, "C": C, "sigma_2": sigma_2, "v_c": v_c}
-        given["weights"] = np.ones(n) if weights is None else weights
-        vars(self).update(_checked(given | {"stribeck": stribeck}, n))
+        stiffness = checked_array("k", k, None, RULES["k"])
+        given = {"sigma": sigma, "C": C, "sigma_2": sigma_2, "v_c": v_c, "stribeck": stribeck}
+        given["weights"] = np.ones(stiffness.size) if weights is None else weights
+        found = _checked(given, stiffness.size)
+        vars(self).update({"stribeck": stribeck, "k": stiffness} | found)
 
     @property
     def n(self) -> int:
@@ -126,8 +128,7 @@ class GMSParameters:
                     cure = f"{own} is a number of the curve: give stribeck=Stribeck(...)"
                     raise error.replaced(advice=cure)
                 raise error
-        new = object.__new__(GMSParameters)
-        vars(new).update(vars(self) | _checked(given, self.n))
+        new: GMSParameters = copied(self, **_checked(given, self.n))
         return new
 
     def with_weights(self, weights: ArrayLike) -> GMSParameters:
@@ -230,7 +231,7 @@ class GMSParameters:
         """
         stiffness = checked_array("k", k, None, RULES["k"])
         shares = checked_array("alpha", alpha, stiffness.size, "> 0")
-        if np.ndim(C):
+        if is_list(C):
             raise ParameterError(
                 "with shares it is one number [N/s]", place="C", value=C, advice=WHICH_C
             )
