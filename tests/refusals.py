@@ -2208,6 +2208,8 @@ rows = {
     "inputs of a model": lambda: simulate(GIVEN, STILL, 1.0, inputs={"u": 1.0}),
     "input used twice": lambda: opened(inputs=("u", "x")),
     "input with a bad name": lambda: opened(inputs=("2u",)),
+    "contact without a text as its name": lambda: opened(contacts=(Contact(["pad"], GIVEN),)),
+    "signal with a name and a text that are wrong": lambda: opened(signals={"f": "2 *", "x": "t"}),
 }
 group("inputs of a system", called, rows)
 AT_TICKS = {"period": 0.1, "outputs": ("u",)}

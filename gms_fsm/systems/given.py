@@ -37,7 +37,7 @@ Text: TypeAlias = str | float  # an expression, or just a number
 
 def check_text(text: object, place: str) -> None:
     """Refuse what is neither an expression nor a number."""
-    if not isinstance(text, str | int | float) or isinstance(text, bool):
+    if not isinstance(text, (str, int, float)) or isinstance(text, bool):
         raise ParameterError(
             "it must be an expression or a number", place=place, value=text, advice="such as '2*t'"
         )
@@ -45,7 +45,7 @@ def check_text(text: object, place: str) -> None:
 
 def mapping_of(given: object, place: str) -> dict[str, Any]:
     """Return a copy of a mapping with texts as keys."""
-    if not isinstance(given, Mapping):
+    if not isinstance(given, (dict, Mapping)):  # that it is no dict takes longer to find out
         raise ParameterError(
             "it must be a mapping, such as {'name': ...}", place=place, value=given
         )
@@ -56,17 +56,17 @@ def texts_of(given: object, place: str) -> dict[str, str]:
     """Return a copy of a mapping of names to texts, with numbers as texts."""
     texts = mapping_of(given, place)
     for name, text in texts.items():
-        check_text(text, f"{place}[{name!r}]")
-    return {
-        name: text if isinstance(text, str) else repr(float(text)) for name, text in texts.items()
-    }
+        if not isinstance(text, str):
+            check_text(text, f"{place}[{name!r}]")
+            texts[name] = repr(float(text))
+    return texts
 
 
 def several(given: object, kind: type, place: str) -> tuple[Any, ...]:
     """Return parts of a kind as a tuple; a single one may stand alone."""
     if isinstance(given, kind):
         return (given,)
-    if not isinstance(given, Iterable) or isinstance(given, str):
+    if not isinstance(given, (tuple, Iterable)) or isinstance(given, str):
         raise ParameterError(f"it must be a {kind.__name__}, or several", place=place, value=given)
     parts = tuple(given)
     for part in parts:
@@ -108,7 +108,7 @@ def checked_numbers(
 
 def is_positive(tree: Value, numbers: Mapping[str, float]) -> bool:
     """Tell whether a value is positive and finite, as far as numbers alone decide."""
-    return bool(names_in(tree) - {*numbers}) or 0.0 < constant(tree, numbers) < math.inf
+    return not names_in(tree) <= numbers.keys() or 0.0 < constant(tree, numbers) < math.inf
 
 
 def constant(tree: Value, numbers: Mapping[str, float]) -> float:

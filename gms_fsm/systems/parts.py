@@ -14,7 +14,7 @@ from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import FloatArray, checked_scalar
 from gms_fsm.charts.stribeck import Stribeck
 from gms_fsm.errors import ParameterError, cut, shown
-from gms_fsm.foundation.arguments import checked_kind, one_of, refusing
+from gms_fsm.foundation.arguments import checked_kind, copied, one_of, refusing
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.systems.given import (
@@ -29,6 +29,7 @@ from gms_fsm.systems.given import (
 from gms_fsm.systems.models import Model, check_bank, is_model, with_values
 
 Motion = Literal["along", "normal", "turning"]  # the first is the default
+MOTIONS = get_args(Motion)
 LOAD = "N"  # the input of a contact that multiplies its Stribeck curve
 COUNTS = ("is_in", "count")  # of the elements in a state; the first where there is one element
 DELAY = re.compile(r"\bdelay\(\s*([^\W\d][\w.]*)\s*,\s*(\d+)\s*\)")
@@ -90,7 +91,7 @@ class Body:
                 place=here,
                 advice="give inertia=... to a free body, velocity=... to a driven one",
             )
-        one_of(f"{here}: motion", self.motion, get_args(Motion))
+        one_of(f"{here}: motion", self.motion, MOTIONS)
         if checked_kind(f"{here}: rotary", self.rotary, bool, "True or False"):
             if self.motion == "normal":
                 raise ParameterError(
@@ -102,7 +103,8 @@ class Body:
             object.__setattr__(self, "motion", "turning")
         object.__setattr__(self, "rotary", self.motion == "turning")
         for each in ("inertia", "force", "velocity"):
-            if (text := getattr(self, each)) is not None:
+            text = getattr(self, each)
+            if text is not None and not isinstance(text, str):
                 check_text(text, f"{here}: {each}")
         for name in (self.name, self.x, self.v):
             check_name(name, here)
@@ -216,28 +218,14 @@ class Contact:
                 place=here,
             )
         given = texts_of({} if inputs is None else inputs, f"{here}: inputs")
-        by_itself = {"t": "it is the time", **dict.fromkeys(chart.velocities, "give v=... instead")}
-        if model is not None:
-            by_itself["s"] = "its model has thresholds; a load on them is inputs={'N': ...}"
-        if taken := [each for each in given if each in by_itself]:
-            raise ParameterError(
-                f"inputs has {shown(taken[0])}, which the contact supplies itself",
-                place=here,
-                advice=by_itself[taken[0]],
-            )
+        for each in given:
+            if cure := _instead(each, chart, model):
+                reason = f"inputs has {shown(each)}, which the contact supplies itself"
+                raise ParameterError(reason, place=here, advice=cure)
         if period is not None:
             period = checked_scalar(f"{here}: period", period, "> 0")
-        for each, value in {
-            "name": name,
-            "chart": chart,
-            "values": values,
-            "v": velocities,
-            "n": n,
-            "inputs": given,
-            "period": period,
-            "model": model,
-        }.items():
-            object.__setattr__(self, each, value)
+        parts = {"name": name, "chart": chart, "values": values, "v": velocities, "n": n}
+        vars(self).update(parts, inputs=given, period=period, model=model)
 
     def __repr__(self) -> str:
         count = f"{self.n} element{'s' * (self.n != 1)}"
@@ -258,8 +246,7 @@ class Contact:
 
     def replaced(self, **fields: Any) -> Contact:
         """Return the same contact with other fields, which fit together."""
-        new = object.__new__(type(self))
-        vars(new).update(vars(self) | fields)
+        new: Contact = copied(self, **fields)
         return new
 
     # What a `Model` has, so that everything that reads models reads contacts too.
@@ -289,6 +276,15 @@ class Contact:
     def sigma_2(self) -> float:
         """Viscous friction of its model, Ns/m, or Nms/rad."""
         return 0.0 if self.model is None else self.model.sigma_2
+
+
+def _instead(name: str, chart: Chart, model: Model | None) -> str:
+    """Return what to do instead of giving an input that a contact supplies; empty for others."""
+    if name == "t":
+        return "it is the time"
+    if name == "s" and model is not None:
+        return "its model has thresholds; a load on them is inputs={'N': ...}"
+    return "give v=... instead" if name in chart.velocities else ""
 
 
 @refusing(ParameterError, "what moves is a Contact")
@@ -427,23 +423,19 @@ class Sampled:
                     place=here,
                     advice=f"its values are {', '.join(self.values)}",
                 )
-        put(
-            self,
-            "initial",
-            {
-                name: checked_scalar(f"{here}: initial[{name!r}]", self._before(name), "finite")
-                for name in self.values
-            },
-        )
+        first, delayed = dict(self.initial), self.delayed
+        for name in self.values if first else ():
+            if name in first:
+                first[name] = checked_scalar(f"{here}: initial[{name!r}]", first[name], "finite")
+        before = {
+            name: first.get(name, first.get(delayed.get(name, name), 0.0)) for name in self.values
+        }
+        put(self, "initial", before)
 
     @property
     def values(self) -> tuple[str, ...]:
         """The names of what it updates."""
         return self.outputs or tuple(self.updates)
-
-    def _before(self, name: str) -> float:
-        """Return a value before the first tick."""
-        return self.initial.get(name, self.initial.get(self.delayed.get(name, name), 0.0))
 
     @property
     def delayed(self) -> dict[str, str]:
@@ -458,6 +450,8 @@ class Sampled:
 
 def _with_delays(updates: Mapping[str, str], sampler: str, here: str) -> Mapping[str, str]:
     """Return updates in which delayed values have names, and are handed on after all others."""
+    if not any("delay" in text for text in updates.values()):
+        return updates
     longest: dict[str, int] = {}
 
     def named(found: re.Match[str]) -> str:

@@ -7,18 +7,15 @@ relative velocity, which is linear in the bodies' velocities.
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import checked_scalar
-from gms_fsm.errors import ExpressionError, ParameterError, Part, cut, shown
-from gms_fsm.foundation.arguments import checked_path, refusing, unknown
+from gms_fsm.charts.parameters import finite_numbers, is_list
+from gms_fsm.errors import ExpressionError, GMSError, ParameterError, Part, cut, shown
+from gms_fsm.foundation.arguments import checked_path, copied, refusing, unknown
 from gms_fsm.foundation.display import displayed
 from gms_fsm.foundation.equality import by_value
 from gms_fsm.language import (
@@ -33,12 +30,7 @@ from gms_fsm.language import (
     renamed,
     spell,
 )
-from gms_fsm.systems.given import (
-    check_name,
-    mapping_of,
-    several,
-    texts_of,
-)
+from gms_fsm.systems.given import check_name, mapping_of, several, texts_of
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.parts import (
     COUNTS,
@@ -74,6 +66,10 @@ __all__ = [
 
 
 Key = tuple[str | int, ...]
+PARTS = {
+    **{"bodies": Body, "springs": Spring, "contacts": Contact, "supervisors": Supervisor},
+    **{"sampled": Sampled, "controllers": Sampled},
+}
 
 
 @refusing(instead={"parameters": "numbers"})
@@ -156,16 +152,12 @@ class System:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise ParameterError("it must be a text", place="name", value=self.name)
-        put, here = object.__setattr__, f"system {shown(self.name)}"
-        kinds = {
-            **{"bodies": Body, "springs": Spring, "contacts": Contact, "supervisors": Supervisor},
-            **{"sampled": Sampled, "controllers": Sampled},
-        }
-        for each, kind in kinds.items():
-            put(self, each, several(getattr(self, each), kind, f"{here}: {each}"))
-        called = (*self.controllers, *(each for each in self.sampled if each.outputs))
-        put(self, "controllers", called)
-        put(self, "sampled", tuple(each for each in self.sampled if not each.outputs))
+        own, here = vars(self), f"system {shown(self.name)}"
+        for each, kind in PARTS.items():
+            own[each] = several(own[each], kind, f"{here}: {each}")
+        if called := [each for each in self.sampled if each.outputs]:
+            own["controllers"] += (*called,)
+            own["sampled"] = tuple(each for each in self.sampled if not each.outputs)
         if self.contacts and not self.bodies:
             raise ParameterError(
                 "it has contacts, but no bodies", place=here, advice="give the bodies that move"
@@ -173,22 +165,24 @@ class System:
         if not self.machines:
             reason = "it has no contacts and no supervisors"
             raise ParameterError(reason, place=here, advice="give at least one")
-        numbers = {
-            name: checked_scalar(f"{here}: {name}", value, "finite")
-            for name, value in mapping_of(self.numbers, f"{here}: numbers").items()
-        }
-        put(self, "numbers", numbers)
-        put(self, "flow", texts_of(self.flow, f"{here}: flow"))
-        put(self, "let", texts_of(self.let, f"{here}: let"))
-        put(self, "signals", mapping_of(self.signals, f"{here}: signals"))
-        put(self, "inputs", several(self.inputs, str, f"{here}: inputs"))
-        self._check_names(here)
-        signals = {name: self._signal(name, given, here) for name, given in self.signals.items()}
-        put(self, "signals", signals)
-        put(self, "units", checked_units(self, here))
-        put(self, "contacts", in_their_units(self.contacts, self, here))
-        put(self, "supervisors", in_their_units(self.supervisors, self, here))
-        self._read()
+        own["numbers"] = finite_numbers(mapping_of(self.numbers, f"{here}: numbers"), here)
+        own["flow"] = texts_of(self.flow, f"{here}: flow")
+        own["let"] = texts_of(self.let, f"{here}: let")
+        own["signals"] = signals = mapping_of(self.signals, f"{here}: signals")
+        own["inputs"] = several(self.inputs, str, f"{here}: inputs")
+        try:
+            for name, given in signals.items():
+                signals[name] = self._signal(name, given, here)
+            like = _read_before.get(key := texts_of_system(self))
+        except (GMSError, TypeError):
+            self._check_names(here)  # what is wrong with a name is said first
+            raise
+        if like is None:
+            self._check_names(here)
+        own["units"] = checked_units(self, here, like)
+        for each in ("contacts", "supervisors"):
+            own[each] = in_their_units(self, each, here, like)
+        self._read(key, like)
 
     def __repr__(self) -> str:
         named = {each: getattr(self, each) for each in ("bodies", "contacts", "supervisors")}
@@ -249,13 +243,11 @@ class System:
                     )
                 seen.add(part.name)
 
-    def _read(self) -> None:
+    def _read(self, key: Any, like: System | None) -> None:
         """Read the texts, unless another system with the same texts has been read."""
         # Imported here: the reader itself needs the classes of this module.
         from gms_fsm.systems.reading.renumbered import check_numbers
 
-        key = texts_of_system(self)
-        like = _read_before.get(key)
         if like is None:
             _ = self.assembly  # raises errors of the texts
             if len(_read_before) >= MOST_READ:
@@ -471,13 +463,11 @@ def with_model(system: System, model: Model, rig: Rig) -> System:
 
     No text is read again.
     """
-    given, new = rig.numbers, object.__new__(System)
+    given = rig.numbers
     numbers = {name: float(given[name]) for name in system.numbers}
-    if not all(map(math.isfinite, numbers.values())):
-        for name, value in numbers.items():  # the first one is refused
-            checked_scalar(f"system {shown(system.name)}: {name}", value, "finite")
-    vars(new).update(
-        {name: value for name, value in vars(system).items() if name != "assembly"},
+    numbers = finite_numbers(numbers, f"system {shown(system.name)}")
+    new: System = copied(
+        system,
         contacts=(system.contacts[0].with_model(model),),
         numbers=numbers,
         signals=dict(rig.signals),
@@ -501,7 +491,7 @@ def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
     chart, values = model.chart, model.values
     key = (
         id(chart),  # the cache keeps this chart, so that no other one gets its id
-        tuple(np.ndim(values[name]) for name in chart.parameter_names),
+        tuple(is_list(values[each.name]) for each in chart.parameters),
         None if model.stribeck is None else model.stribeck.text,
         tuple(getattr(model, "inputs", {}).items()),
         rig.title,

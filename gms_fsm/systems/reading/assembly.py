@@ -205,6 +205,11 @@ class Assembly:
         return tuple(read_by(self, bank) for bank in self.banks)
 
     @cached_property
+    def locking(self) -> bool:
+        """Whether a contact is always locked."""
+        return any(all(state.locked for state in bank.chart.states) for bank in self.banks)
+
+    @cached_property
     def free(self) -> tuple[Body, ...]:
         """The bodies that are not driven."""
         return tuple(body for body in self.system.bodies if not body.driven)
@@ -280,7 +285,6 @@ class SystemReader:
     def __init__(self, system: System) -> None:
         self.system, self.here = system, Part(f"system {system.name!r}")
         self.definitions: list[Definition] = []
-        self.shared, self.own = numbers_of(system)
         self.aliases: dict[str, Value] = {}  # of the relative velocities that are those of a body
 
     def value(self, text: str | float, names: Iterable[str], owner: Part) -> Value:
@@ -354,8 +358,7 @@ class SystemReader:
             inertias,
             flow,
             updates,
-            self.shared,
-            self.own,
+            *numbers_of(system),
         )
         check_loops(read)
         return read
@@ -572,7 +575,8 @@ class SystemReader:
     def lets(self, contact: Contact, index: int, names: dict[str, Value]) -> None:
         """Define the named expressions of a chart."""
         chart, c = contact.chart, contact.name
-        own = {name for name in names if names_in(names[name]) & {*self.own}}
+        each = numbers_of(self.system)[1]
+        own = {name for name in names if names_in(names[name]) & {*each}}
         own |= {*chart.variables, "s"} & {*names}
         for name, tree in chart.lets.items():
             per_element = bool(names_in(tree) & own)

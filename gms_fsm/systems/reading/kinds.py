@@ -32,9 +32,14 @@ if TYPE_CHECKING:
 Powers = Mapping[str, int]  # exponents of base units
 
 
-def checked_units(system: System, here: str) -> dict[str, str]:
-    """Return the declared units of a system, if they are units of SI and of its quantities."""
+def checked_units(system: System, here: str, like: System | None) -> dict[str, str]:
+    """Return the declared units of a system, if they are units of SI and of its quantities.
+
+    Those of another one with the same texts are.
+    """
     given = texts_of(system.units, f"{here}: units")
+    if not given or (like is not None and given == like.units):
+        return given
     known = [*system.signals, *system.numbers, *system.flow, *system.let]
     known += [name for each in system.sampled for name in each.updates]
     known += [f"{each.name}.{name}" for each in system.machines for name in _own(each)]
@@ -57,15 +62,21 @@ def _own(machine: Contact) -> Iterator[str]:
     yield from dict.fromkeys((*chart.parameter_names, *chart.inputs, *chart.variables))
 
 
-def in_their_units(machines: tuple[Contact, ...], system: System, here: str) -> tuple[Contact, ...]:
-    """Return contacts whose charts know in which units they are measured."""
+def in_their_units(
+    system: System, kind: str, here: str, like: System | None
+) -> tuple[Contact, ...]:
+    """Return contacts, or supervisors, whose charts know in which units they are measured.
+
+    They turn if those of another system with the same texts do, in the same units.
+    """
     found = []
-    for each in machines:
+    seen = getattr(like, kind) if like is not None and like.units == system.units else ()
+    for k, each in enumerate(getattr(system, kind)):
         known = dict(each.chart.units)  # as another system has declared them
-        for name in _own(each):
+        for name in _own(each) if system.units else ():
             if (unit := system.units.get(f"{each.name}.{name}")) is not None:
                 known[name] = unit
-        rotary = bool(each.v) and _turns(each, system, here)
+        rotary = seen[k].chart.rotary if seen else bool(each.v) and _turns(each, system, here)
         chart = measured(each.chart, rotary, tuple(known.items()))
         found.append(each if chart is each.chart else each.replaced(chart=chart))
     return tuple(found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from gms_fsm.systems.given import is_positive
 from gms_fsm.systems.reading.assembly import Assembly, SystemReader
 from gms_fsm.systems.reading.values import numbers_of
 from gms_fsm.systems.springs import check_springs
@@ -25,7 +26,8 @@ def renumbered(read: Assembly, system: System) -> Assembly:
 
 def check_numbers(read: Assembly, system: System) -> None:
     """Refuse numbers with which a system that was read could not be run."""
-    reader = SystemReader(system)
-    reader.check_inertias(read.inertias)
+    if not all(is_positive(tree, system.numbers) for tree in read.inertias.values()):
+        SystemReader(system).check_inertias(read.inertias)
     check_springs(system)
-    reader.check_locks(read.banks)
+    if read.locking:
+        SystemReader(system).check_locks(read.banks)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from gms_fsm.charts.chart import Chart
+from gms_fsm.charts.parameters import is_list
 from gms_fsm.foundation.display import full_text
 from gms_fsm.foundation.equality import ByIdentity
 
@@ -16,14 +15,14 @@ if TYPE_CHECKING:
 
 
 def texts_of_system(system: System) -> tuple[Any, ...]:
-    """Return everything that the trees of a system depend on, in hashable form."""
+    """Return everything that the trees of a system and its names depend on, in hashable form."""
     contacts = [
         (
             contact.name,
             _text_of(ByIdentity(contact.chart)),
             contact.v,
             tuple(contact.inputs.items()),
-            tuple(np.ndim(contact.values[name]) for name in contact.chart.parameter_names),
+            tuple(is_list(contact.values[each.name]) for each in contact.chart.parameters),
             contact.model is None,
             contact.period is None,
             contact.stribeck and contact.stribeck.text,
@@ -46,6 +45,8 @@ def texts_of_system(system: System) -> tuple[Any, ...]:
         tuple(system.let.items()),
         tuple(sampled),
         system.open,
+        len(system.contacts),
+        tuple(each.name for each in system.controllers),
     )
 
 
