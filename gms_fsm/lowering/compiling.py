@@ -58,10 +58,23 @@ def packed(p: Arguments) -> Packed:
     return np.array(shared, dtype=np.float64), _table(own), _table(tables)
 
 
+def put_numbers(p: Arguments, shared: FloatArray, own: FloatArray) -> None:
+    """Write the numbers of a program's arguments into arrays."""
+    shared[...] = p[0]
+    if p[1]:
+        own[...] = _padded(p[1])
+
+
 def _table(rows: list[list[float]]) -> FloatArray:
-    length = max(map(len, rows), default=0)
-    padded = [row + row[-1:] * (length - len(row)) for row in rows]
-    return np.array(padded, dtype=np.float64).reshape(len(rows), length)
+    return np.array(_padded(rows), dtype=np.float64).reshape(len(rows), -1 if rows else 0)
+
+
+def _padded(rows: list[list[float]]) -> list[list[float]]:
+    """Return rows as long as the longest one, with the last number of each again."""
+    lengths = {*map(len, rows)}
+    if len(lengths) < 2:
+        return rows
+    return [row + row[-1:] * (max(lengths) - len(row)) for row in rows]
 
 
 def plan_in_block(plan: Any, places: Any) -> Any:
@@ -175,10 +188,11 @@ def observe_rows(
     """Return some results of `observe` for many rows, with all signs evaluated live."""
     made = _observer(program)
     block = made.block()
-    shared, own, tables = packed(program.p)
-    places, table = block.contents.functions.p, np.empty((t.size, len(kept)))
-    places[0][...], places[1][...] = shared, own
-    columns = {"t": t, "y": y, "mode": mode, "table": table, "functions.p.2": tables}
+    put_numbers(program.p, *block.contents.functions.p[:2])
+    table = np.empty((t.size, len(kept)))
+    columns = {"t": t, "y": y, "mode": mode, "table": table}
+    if program.p[2]:
+        columns["functions.p.2"] = _table(program.p[2])
     for name, column in columns.items():
         block.place(name, np.ascontiguousarray(column))
     made.engine(block, kept.start, t.size)

@@ -179,7 +179,12 @@ class SystemLayout:
 
     def labelled(self, values: Sequence[float]) -> dict[str, Any]:
         """Return one value for each component, by what they are called; of elements as lists."""
-        return {self.label(name): each for name, each in self.y.named(values).items()}
+        return dict(zip(self._labels, self.y.named(values).values(), strict=True))
+
+    @cached_property
+    def _labels(self) -> tuple[str, ...]:
+        """What the components of the state vector are called."""
+        return tuple(map(self.label, (*self.y.shared, *self.y.own)))
 
     @cached_property
     def events(self) -> tuple[str, ...]:

@@ -54,7 +54,7 @@ from gms_fsm.lowering.printing.python import FUNCTIONS, python
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.mounted import mounted
 from gms_fsm.systems.reading.assembly import Bank, ContactEdge
-from gms_fsm.systems.reading.values import numbers_of
+from gms_fsm.systems.reading.values import own_in, shared_in
 from gms_fsm.systems.rigs import Rig
 from gms_fsm.systems.signals import (
     Corners,
@@ -215,8 +215,8 @@ def structure(system: System) -> tuple[Any, ...]:
     """
     spelled = tuple(map(_spelling, system.signals.values()))
     # A ratio that is 1 or 0 is left out of no text; an inertia that is not positive is refused.
-    zeros = tuple(name for name, value in system.numbers.items() if value == 0.0)
-    sizes = tuple(contact.n for contact in system.machines)
+    zeros = tuple([name for name, value in system.numbers.items() if value == 0.0])
+    sizes = tuple([contact.n for contact in system.machines])
     return id(system.shape), sizes, spelled, zeros
 
 
@@ -333,14 +333,14 @@ def _kind(events: Sequence[str], bank: Bank, edge: ContactEdge) -> int:
 
 def arguments(system: System) -> Arguments:
     """Return the numbers of a system in the form that its program's functions take."""
-    shared, own = numbers_of(system)
     tables = [
         as_floats(column)
         for s in system.signals.values()
         if isinstance(s, Corners)
         for column in (s.times, s.values)
     ]
-    return list(shared.values()), [as_floats(values) for _, values in own.values()], tables
+    shared = [value for _, _, value in shared_in(system)]
+    return shared, [as_floats(values) for _, _, values in own_in(system)], tables
 
 
 def machines_of(functions: Mapping[str, Any]) -> Machines:

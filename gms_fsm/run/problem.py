@@ -12,7 +12,7 @@ import numpy as np
 
 import integrators
 from gms_fsm.charts.chart import Chart, Transition
-from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar
+from gms_fsm.charts.parameters import FloatArray, as_floats, checked_array, checked_scalar, is_list
 from gms_fsm.errors import ParameterError, SignalError, keyed, shown
 from gms_fsm.foundation.arguments import there_are, unknown
 from gms_fsm.foundation.equality import ByIdentity
@@ -287,7 +287,7 @@ def _recorded(chosen: Settings, atol: Setting, t_start: float, t_end: float) -> 
 def checked_times(t_start: float, t_end: float) -> tuple[float, float]:
     """Return start and end of a run, which a clock of floats can resolve."""
     t_start = checked_scalar("t_start", t_start, "finite")
-    if np.ndim(t_end):
+    if is_list(t_end):
         raise ParameterError(
             "it must be a number",
             place="t_end",

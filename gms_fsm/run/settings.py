@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict, Unpack
@@ -15,6 +16,7 @@ import integrators
 from gms_fsm.charts.parameters import FloatArray, checked_array, checked_scalar
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import meant, one_of, refusing
+from gms_fsm.foundation.equality import are_same
 from gms_fsm.lowering.scales import Tolerance
 
 MOST_STEPS = 1_000_000  # default limit for a run
@@ -248,7 +250,7 @@ class Settings:
                 place="settings",
                 value=settings,
             )
-        fields = [each.name for each in dataclasses.fields(cls)]
+        fields = cls.__dataclass_fields__
         for name in options:
             if name not in fields:
                 hint = meant(name, [*fields, "t_end", "t_start"]) or f"it takes {', '.join(fields)}"
@@ -272,7 +274,14 @@ def _check_count(max_steps: object) -> None:
         )
 
 
+_latest = weakref.ref[FloatArray](np.empty(0))  # times that were found to increase, while in use
+
+
 def _increasing(t_eval: ArrayLike) -> FloatArray:
+    global _latest
+    known = _latest()
+    if known is not None and isinstance(t_eval, np.ndarray) and are_same(t_eval, known):
+        return known
     if isinstance(t_eval, float | int):
         raise ParameterError(
             "it must be the times of the rows",
@@ -288,4 +297,5 @@ def _increasing(t_eval: ArrayLike) -> FloatArray:
             f"t_eval[{i}] = {wanted[i]} is not before t_eval[{i + 1}] = {wanted[i + 1]}",
             advice="times must increase",
         )
+    _latest = weakref.ref(wanted)
     return wanted

@@ -40,6 +40,7 @@ from gms_fsm.traces.verdicts import Trust, Verdict
 from gms_fsm.traces.views import (
     CALLED,
     BodyTrace,
+    contact_seen,
     driven_velocity,
     dwell_times,
     given_values,
@@ -198,12 +199,7 @@ class Trace:
             If there is no such contact.
         """
         bank = self.program.layout.contact(name)
-        if not self.what.named:
-            return self
-        every = self.firings if self.every is None else self.every
-        chosen = replace(self, firings=every.of_contact(bank.name), which=bank.name, every=every)
-        vars(chosen).update({k: u for k, u in vars(self).items() if k in ("program", "seen")})
-        return chosen
+        return contact_seen(self, bank.name) if self.what.named else self
 
     supervisor = contact
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray, as_numbers
 from gms_fsm.errors import OutputError, ParameterError, SignalError, TraceFileError, shown
-from gms_fsm.foundation.arguments import no_file, some_of
+from gms_fsm.foundation.arguments import copied, no_file, some_of
 from gms_fsm.foundation.display import Log, short_repr
 from gms_fsm.language import evaluate
 from gms_fsm.lowering.observing import armed, rate, sigmas
@@ -44,6 +44,15 @@ class BodyTrace:
     name: str
     x: FloatArray
     v: FloatArray
+
+
+def contact_seen(trace: Trace, name: str) -> Trace:
+    """Return a run as one contact sees it, with all that has been generated and observed."""
+    every = trace.firings if trace.every is None else trace.every
+    kept = {k: u for k, u in vars(trace).items() if k in ("program", "seen")}
+    own = every.of_contact(name)
+    seen: Trace = copied(trace, firings=own, which=name, every=every, **kept)
+    return seen
 
 
 def range_of_force(trace: Trace) -> tuple[float, float]:

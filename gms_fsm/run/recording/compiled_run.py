@@ -437,7 +437,8 @@ class Columns:
         """Return the firings so far."""
         count, log = self.log.firings, self.log
         columns: Any = (log.t, log.machine, log.edge, log.numbers)
-        return self.start.fired(*(each[:count].copy() for each in columns))
+        t, machine, edge, numbers = (each[:count] for each in columns)
+        return self.start.fired(t.copy(), machine, edge, numbers.copy())
 
     def trace(self) -> Trace:
         """Return the trace of all recorded data."""

@@ -6,13 +6,14 @@ on, and the settings; the bits are those of a run of its own.
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections.abc import Hashable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from gms_fsm.foundation.arguments import copied
+from gms_fsm.foundation.equality import ByBits
 from gms_fsm.lowering.program import Arguments, arguments, structure
 from gms_fsm.run.problem import Problem, checked_times
 from gms_fsm.run.repeated.block import RepeatedRun
@@ -27,6 +28,7 @@ WORTH_IT = 256  # runs of one key, then functions are compiled: 0.5 s, to save 0
 LARGE = 2**24  # bytes of rows that are not kept for another run
 
 _known = dict[Hashable, "RunsOfOneText"]()
+_count = itertools.count()
 _lock = threading.Lock()
 
 
@@ -34,6 +36,7 @@ _lock = threading.Lock()
 class RunsOfOneText:
     """What is remembered of runs that differ in numbers only."""
 
+    asked: int = 0  # when it was asked last, counted over all
     alone: int = 0  # how many were runs of their own
     runs: RepeatedRuns | None = None
 
@@ -72,10 +75,11 @@ def runs_like(
         return None
     key = _key(what, *checked_times(t_start, t_end), chosen)
     with _lock:
-        found = _known.pop(key, None) or RunsOfOneText()
-        _known[key] = found  # the latest one is last
-        while len(_known) > MOST:
-            del _known[next(iter(_known))]
+        if (found := _known.get(key)) is None:
+            if len(_known) >= MOST:
+                del _known[min(_known, key=lambda each: _known[each].asked)]
+            _known[key] = found = RunsOfOneText()
+        found.asked = next(_count)
     return found
 
 
@@ -84,12 +88,13 @@ def _with_numbers(start: Problem, what: Mounted, p: Arguments, run: RepeatedRun)
     used: Any = run.columns.buffers.plan.control.atol
     atol = start.program.layout.labelled(used.tolist())
     settings = start.settings if start.chosen.atol else {**start.settings, "atol": atol}
-    return replace(start, what=what, program=replace(start.program, p=p), settings=settings)
+    program = copied(start.program, p=p)
+    solved: Problem = copied(start, what=what, program=program, settings=settings)
+    return solved
 
 
 def _key(what: Mounted, t_start: float, t_end: float, chosen: Settings) -> Hashable:
     """Return all but the numbers; what is not hashable is alive as long as its `id` is used."""
     records = (id(u) for u in what.system.signals.values() if isinstance(u, Corners))
-    rows = None if chosen.t_eval is None else np.asarray(chosen.t_eval).tobytes()
-    others = (value for name, value in vars(chosen).items() if name != "t_eval")
-    return structure(what.system), what.named, *records, t_start, t_end, rows, *others
+    others = {**vars(chosen), "t_eval": None if chosen.t_eval is None else ByBits(chosen.t_eval)}
+    return structure(what.system), what.named, *records, t_start, t_end, *others.values()

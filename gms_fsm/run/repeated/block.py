@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gms_fsm.gradients.directions import Directions, scales_of
-from gms_fsm.lowering.compiling import packed, with_more
+from gms_fsm.lowering.compiling import put_numbers, with_more
 from gms_fsm.lowering.program import Arguments
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.compiled_run import STEPS_AT_ONCE, WORTH_A_LOOK, Columns
@@ -95,7 +95,7 @@ class RepeatedRun:
     def put_all(self, p: Arguments) -> None:
         """Return to the start, with all numbers of a system of the same text."""
         self.put(())
-        self.shared[...], self.own[...] = packed(p)[:2]
+        put_numbers(p, self.shared, self.own)
 
     @property
     def size(self) -> int:
@@ -241,8 +241,9 @@ class RepeatedRun:
 
     def _keep(self, words: Iterable[slice]) -> None:
         """Let a run begin with words as they are now."""
+        first, now = self.first[0], self.columns.block.words
         for each in words:
-            self.first[0][each] = self.columns.block.words[each]
+            first[each] = now[each]
 
     def taken(self) -> Callable[[], tuple[Rows, Rows, Firings]]:
         """Copy rows, stops and log; what is returned makes the objects of them."""
@@ -251,8 +252,7 @@ class RepeatedRun:
             found = columns.contents()
             if columns.handed_out:
                 columns.replace_rows()
-                rows = zip(ROWS, columns.rows, strict=True)
-                self._keep(columns.block.place(name, each) for name, each in rows)
+                self._keep(map(columns.block.place, ROWS, columns.rows))
             return lambda: found
         out, log = columns.buffers.out, columns.log
         count, fired = out.row, log.firings
