@@ -12,12 +12,11 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from gms_fsm.charts.chart import Chart
 from gms_fsm.charts.parameters import finite_numbers, is_list
 from gms_fsm.errors import ExpressionError, GMSError, ParameterError, Part, cut, shown
 from gms_fsm.foundation.arguments import checked_path, copied, refusing, unknown
 from gms_fsm.foundation.display import displayed
-from gms_fsm.foundation.equality import by_value
+from gms_fsm.foundation.equality import ByIdentity, by_value
 from gms_fsm.language import (
     Binary,
     Name,
@@ -250,9 +249,7 @@ class System:
 
         if like is None:
             _ = self.assembly  # raises errors of the texts
-            if len(_read_before) >= MOST_READ:
-                _read_before.clear()
-            _read_before[key] = self
+            _kept(_read_before, key, self)
         else:
             check_numbers(like.assembly, self)
             object.__setattr__(self, "_like", like)
@@ -446,6 +443,15 @@ class System:
 
 MOST_READ = 64
 _read_before: dict[Any, System] = {}  # by its texts
+_mounted_before: dict[Any, System] = {}  # by what the texts of a model on a rig depend on
+
+
+def _kept(known: dict[Any, System], key: Any, system: System) -> System:
+    """Remember a system whose texts have been read."""
+    if len(known) >= MOST_READ:
+        known.clear()
+    known[key] = system
+    return system
 
 
 Named = TypeVar("Named", "Body", "Contact")
@@ -490,7 +496,7 @@ def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
     signals = tuple(rig.signals.items())
     chart, values = model.chart, model.values
     key = (
-        id(chart),  # the cache keeps this chart, so that no other one gets its id
+        ByIdentity(chart),
         tuple(is_list(values[each.name]) for each in chart.parameters),
         None if model.stribeck is None else model.stribeck.text,
         tuple(getattr(model, "inputs", {}).items()),
@@ -501,24 +507,13 @@ def system_of(model: Model, rig: Rig, period: float | None = None) -> System:
         tuple((name, type(each), getattr(each, "text", None)) for name, each in signals),
         period,
     )
-    return with_model(_of_shape(_Shape(key, model, rig, period, chart)), model, rig)
+    if (like := _mounted_before.get(key)) is None:
+        like = _kept(_mounted_before, key, _read_from(model, rig, period))
+    return with_model(like, model, rig)
 
 
-@dataclass(frozen=True)
-class _Shape:
-    """What the texts of a model on a rig depend on, with a model and a rig of that shape."""
-
-    key: tuple[Any, ...]
-    model: Model = field(compare=False)
-    rig: Rig = field(compare=False)
-    period: float | None = field(compare=False)
-    chart: Chart = field(compare=False)
-
-
-@functools.lru_cache(maxsize=64)
-def _of_shape(shape: _Shape) -> System:
+def _read_from(model: Model, rig: Rig, period: float | None) -> System:
     """Read the texts of a model on a rig."""
-    model, rig, period = shape.model, shape.rig, shape.period
     springs: tuple[Spring, ...] = ()
     if rig.acceleration is None:
         body = Body("body", velocity="v")
