@@ -79,8 +79,8 @@ from gms_fsm.app.lessons.engine.predict import Question
 
 MASS, STIFFNESS, DAMPING, SPEED = 1.14e-3, 8713.0, 6.3e-3, 0.15  # kg, N/m, Ns/m, m/s
 F_S, HARDER, END = 0.24, 1.5, 0.05  # N, 1, s
+ROWS = 2000
 FORCES = (0.16, 0.2, F_S, 0.3, HARDER * F_S)  # N
-ROWS = 2001
 
 
 def bow(F_s: float, F_c: float) -> GMS:
@@ -106,13 +106,13 @@ def run() -> dict[str, Any]:
     found = {F_s: bowed(F_s, F_s / 3) for F_s in FORCES}
     cycle = found[F_S]
     replayed = {f"{F_S:g} N": cycle.trace}
-    fine = cycle.trace.sample(np.linspace(cycle.trace.t[0], cycle.trace.t[-1], ROWS))
+    fine = cycle.trace.refined(ROWS)  # with both sides of a switch, where F jumps
     v, push = fine.v + SPEED, -fine.F  # of the string, and what the bow does to it
     place = fine.x + SPEED * fine.t
     swing, power = 0.5e6 * np.ptp(place), push * v  # um, W
     forward, backward = (_integral(fine.t, np.maximum(sign * power, 0.0)) for sign in (1.0, -1.0))
     sound = forward - backward
-    sticks = np.mean(fine.states[:, 0] == "stick")
+    sticks = _integral(fine.t, 1.0 * (fine.states[:, 0] == "stick")) / cycle.period
     multiplier = abs(cycle.multipliers[0])
     pitches = [1.0 / each.period for each in found.values()]
     sounds, pressed = 1.0 / cycle.period, 1.0 / found[FORCES[-1]].period
