@@ -7,6 +7,7 @@ in the last bits. Nothing is contracted or reassociated.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Sequence
 
@@ -39,6 +40,7 @@ from integrators.machine_code.tree import (
     TypedFunction,
     While,
 )
+from integrators.machine_code.tuning import KEEPING
 
 __all__ = ["llvm_text"]
 
@@ -135,6 +137,11 @@ class _Writer:
         self.function, self.module, self.foreign = function, module, foreign
         self.results = dict.fromkeys(module.outer, "i")
         self.results |= {each.name: each.results for each in module.functions}
+        self.keeping = {
+            each.name
+            for each in module.functions
+            if not each.entry and re.sub(r"_\d+$", "", each.name) in KEEPING
+        }
         self.lines: list[str] = []
         self.counter = 0
         self.loops: list[tuple[str, str]] = []  # labels of continue and break
@@ -153,6 +160,7 @@ class _Writer:
             self.lines.append("  ret void" if not function.results else "  unreachable")
         inline = _INLINE[None if function.inline and len(self.lines) > LONGEST else function.inline]
         results = self.result(function.results)
+        head += self.convention(function.name)
         opening = f"{head} {results} @{function.name}({names}) nounwind{inline} {{"
         return "\n".join([opening, "entry:", *self.lines, "}"])
 
@@ -451,11 +459,16 @@ class _Writer:
     def call(self, call: Invoke) -> str:
         """Write a call of a function of the module."""
         given = ", ".join(f"{_TYPES[each.kind]} {self.value(each)}" for each in call.arguments)
-        line = f"call {self.result(self.results[call.name])} @{call.name}({given})"
+        how = self.convention(call.name)
+        line = f"call{how} {self.result(self.results[call.name])} @{call.name}({given})"
         if not self.results[call.name]:
             self.lines.append(f"  {line}")
             return ""
         return self.new(line)
+
+    def convention(self, name: str) -> str:
+        """Return how a function is called, if not as in C."""
+        return " preserve_allcc" if name in self.keeping else ""
 
 
 def _compare(op: str, kind: str) -> str:

@@ -27,3 +27,5 @@ HOT = {
     "advance", "_along", "first_change", "_bracket", "_error", "interpolate", "margins",
     "observe_rows", "_probe", "rate_in_lanes", "_search", "slope_in_lanes", "switch", "take_step",
 }  # fmt: skip
+# What is called in the midst of a step saves the registers it uses: its callers use nearly all.
+KEEPING = {"exp", "margins"}

@@ -42,7 +42,7 @@ from integrators.machine_code.layout import BlockLayout, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
 from integrators.machine_code.tree import Local, OuterEntry
-from integrators.machine_code.tuning import HOT, INLINE
+from integrators.machine_code.tuning import HOT, INLINE, KEEPING
 from integrators.runners import columns, observing, repeating, stepping
 from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
 from integrators.runners.stepping import Sample
@@ -218,7 +218,8 @@ def edition() -> str:
             else:
                 constants.append((name, getattr(value, "__match_args__", None)))
     return digest(
-        *functions, text=repr((sys.version, constants, sorted(INLINE.items()), sorted(HOT)))
+        *functions,
+        text=repr((sys.version, constants, sorted(INLINE.items()), sorted(HOT), sorted(KEEPING))),
     )
 
 
