@@ -186,7 +186,7 @@ def observe_rows(
     program: Program, t: FloatArray, y: FloatArray, mode: NDArray[np.int64], kept: range
 ) -> FloatArray:
     """Return some results of `observe` for many rows, with all signs evaluated live."""
-    made = _observer(program)
+    made = _observer(program, kept)
     block = made.block()
     put_numbers(program.p, *block.contents.functions.p[:2])
     table = np.empty((t.size, len(kept)))
@@ -195,7 +195,9 @@ def observe_rows(
         columns["functions.p.2"] = _table(program.p[2])
     for name, column in columns.items():
         block.place(name, np.ascontiguousarray(column))
-    made.engine(block, kept.start, t.size)
+    done = made.engine(block, t.size)
+    if done < t.size:
+        _observer(program, kept, slides=True).engine(block, done, t.size)
     made.take_back(block)
     return table
 
@@ -243,13 +245,13 @@ class ReadyCode:
             self._spare.append(block)
 
 
-_observers: dict[int, ReadyCode] = {}
+_observers: dict[tuple[int, range, bool], ReadyCode] = {}
 
 
-def _observer(program: Program) -> ReadyCode:
+def _observer(program: Program, kept: range, *, slides: bool = False) -> ReadyCode:
     from integrators.runners import compiled
 
-    layout, key = program.layout, id(program.functions)
+    layout, key = program.layout, (id(program.functions), kept, slides)
     with _lock:
         if (ready := _observers.get(key)) is None:
             check_llvmlite()
@@ -260,6 +262,8 @@ def _observer(program: Program) -> ReadyCode:
                 functions(program)["observe"],
                 on_surfaces(program, functions(program), packed(program.p)),
                 (layout.y.size, layout.modes, layout.observed.size),
+                kept,
+                slides,
                 _calls(program),
                 store(),
                 notify,

@@ -151,7 +151,7 @@ class _Writer:
     def text(self) -> str:
         """Return its text."""
         function = self.function
-        names = ", ".join(f"{_TYPES[p.kind]} %{_name(p.name)}" for p in function.parameters)
+        names = ", ".join(map(self.parameter, function.parameters))
         head = "define" if function.entry else "define internal"
         for each in function.variables:
             self.lines.append(f"  %{_name(each.name)} = alloca {_TYPES[each.kind]}")
@@ -160,9 +160,19 @@ class _Writer:
             self.lines.append("  ret void" if not function.results else "  unreachable")
         inline = _INLINE[None if function.inline and len(self.lines) > LONGEST else function.inline]
         results = self.result(function.results)
+        # Of a loop with a call of memcpy LLVM makes no vectors.
+        calls = ' "no-builtin-memcpy"' if function.apart else ""
         head += self.convention(function.name)
-        opening = f"{head} {results} @{function.name}({names}) nounwind{inline} {{"
+        opening = f"{head} {results} @{function.name}({names}) nounwind{inline}{calls} {{"
         return "\n".join([opening, "entry:", *self.lines, "}"])
+
+    def parameter(self, local: Local) -> str:
+        """Return a parameter with what is known of it."""
+        name, apart = local.name.partition(".")[0], self.function.apart
+        known = " noalias" if name in apart else ""
+        if apart and name == "block":  # it can be read before it is known whether that is needed
+            known = f" align 8 dereferenceable({8 * self.module.words})"
+        return f"{_TYPES[local.kind]}{known} %{_name(local.name)}"
 
     @staticmethod
     def result(kinds: str) -> str:

@@ -397,6 +397,8 @@ class TypedFunction:
         Whether it is put inline; LLVM decides if omitted.
     about : str
         What it is for, for readers of what is printed.
+    apart : tuple of str
+        Of its arguments the arrays that nothing else that it is given overlaps.
     """
 
     name: str
@@ -407,6 +409,7 @@ class TypedFunction:
     entry: bool = False
     inline: bool | None = None
     about: str = field(default="", compare=False)
+    apart: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -426,3 +429,4 @@ class Module:
     tables: list[ConstantTable] = field(default_factory=list)
     callbacks: int = 0
     outer: dict[str, str] = field(default_factory=dict)  # entries of others: kinds of arguments
+    words: int = 0  # of the block

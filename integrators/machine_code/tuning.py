@@ -14,7 +14,7 @@ NOT_INLINE = [
     "_refuse", "_count", "_rearm", "_reset_counts", "_reset_if_advanced", "_start",
     "advance", "_begin", "_impulse", "step_to",
     "arm_on", "drop", "entangled", "let_go", "look_back", "look_held", "release", "_ask", "_bears",
-    "_along", "arrive", "fix", "slide_in_lanes", "margins_in_lanes", "_await",
+    "_along", "arrive", "fix", "observe_alike", "slide_in_lanes", "margins_in_lanes", "_await",
     "_combine", "crossed", "_is_far", "leave", "let_go_in_time", "_values",
     "aimed_step", "_changed", "_close_few", "_first_step", "steps_to_change",
 ]  # fmt: skip
@@ -22,10 +22,12 @@ NOT_INLINE = [
 # row is observed: a tenth of the time, too.
 ALWAYS = "flow", "flow_live", "flow_on", "observe", "weighted_sum"
 INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(ALWAYS, True)
-# Every step calls these.
+# Arrays that nothing else that these functions are given overlaps: what is read stays in registers.
+APART = {"observe_alike": ("seen", "table")}
+# Every step calls these; an entry that is among them has no other kind of function.
 HOT = {
     "advance", "_along", "first_change", "_bracket", "_error", "interpolate", "margins",
-    "observe_rows", "_probe", "rate_in_lanes", "_search", "slope_in_lanes", "switch", "take_step",
+    "observe_free", "_probe", "rate_in_lanes", "_search", "slope_in_lanes", "switch", "take_step",
 }  # fmt: skip
 # What is called in the midst of a step saves the registers it uses: its callers use nearly all.
 KEEPING = {"exp", "margins"}

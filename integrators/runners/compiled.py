@@ -41,8 +41,8 @@ from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.layout import BlockLayout, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, target_name
-from integrators.machine_code.tree import Local, OuterEntry
-from integrators.machine_code.tuning import HOT, INLINE, KEEPING
+from integrators.machine_code.tree import Const, Local, OuterEntry
+from integrators.machine_code.tuning import APART, HOT, INLINE, KEEPING
 from integrators.runners import columns, observing, repeating, stepping
 from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
 from integrators.runners.stepping import Sample
@@ -105,8 +105,8 @@ class EntryPoint(NamedTuple):
         A function of the subset.
     parts : str
         The parts of the block that are its first arguments, as in `BlockLayout.part`; all if empty.
-    extra : tuple of str
-        Integers that are passed besides the block.
+    extra : tuple of str or int
+        Integers that are passed besides the block, by name, and those that are known.
     vectors : bool
         Whether it computes numbers side by side.
     """
@@ -114,11 +114,12 @@ class EntryPoint(NamedTuple):
     name: str
     function: Callable[..., Any]
     parts: str = ""
-    extra: tuple[str, ...] = ()
+    extra: tuple[str | int, ...] = ()
     vectors: bool = False
 
 
 RECORD = "functions machines buffers log recorded tally"
+FREE = "observe functions.p sliding t y mode seen table"
 
 
 class StepArguments(NamedTuple):
@@ -219,7 +220,9 @@ def edition() -> str:
                 constants.append((name, getattr(value, "__match_args__", None)))
     return digest(
         *functions,
-        text=repr((sys.version, constants, sorted(INLINE.items()), sorted(HOT), sorted(KEEPING))),
+        text=repr(
+            (sys.version, constants, sorted(INLINE.items()), *map(sorted, (HOT, KEEPING)), APART)
+        ),
     )
 
 
@@ -265,7 +268,8 @@ def _made(
             return _object(quick, layout, entries, store, notify, at_once=True), True
         return _object(name, layout, entries, store, notify), False
 
-    return CompiledFunction(layout, code, calls, len(entries[0].extra))
+    passed = [each for each in entries[0].extra if isinstance(each, str)]
+    return CompiledFunction(layout, code, calls, len(passed))
 
 
 def _name(text: str, arguments: Any, layout: BlockLayout, entries: Sequence[EntryPoint]) -> str:
@@ -313,11 +317,14 @@ def _object(
 
 def _written(
     layout: BlockLayout, entries: Sequence[EntryPoint], each: bool
-) -> tuple[str, set[str]]:
-    """Return the text of functions on a block, and the names of the hot ones; no tree stays."""
+) -> tuple[str, set[str] | None]:
+    """Return the text of functions on a block, and the names of the hot ones; no tree stays.
+
+    If the entry itself is hot, all are.
+    """
     translator = translated(layout, entries, each=each)
     hot = {name for name, own in translator.origins.items() if own in HOT}
-    return llvm_text(translator.module), hot
+    return llvm_text(translator.module), None if entries[0].function.__name__ in HOT else hot
 
 
 @contextlib.contextmanager
@@ -336,14 +343,18 @@ def translated(
     layout: BlockLayout, entries: Sequence[EntryPoint], *, each: bool = False
 ) -> Translator:
     """Return functions on a block, translated; ``each`` calls the first one for many blocks."""
-    translator = Translator(INLINE)
+    translator = Translator(INLINE, APART)
+    translator.module.words = layout.words
     made = [
         translator.entry(
             entry.name,
             entry.function,
             [
                 *map(layout.part, entry.parts.split() or layout.value.fields),
-                *(NumberValue(Local("i", extra)) for extra in entry.extra),
+                *(
+                    NumberValue(Local("i", each) if isinstance(each, str) else Const("i", each))
+                    for each in entry.extra
+                ),
             ],
         )
         for entry in entries
@@ -524,11 +535,13 @@ def observer(
     observe: Callable[..., Any],
     on: Held,
     widths: tuple[int, int, int],
+    kept: range,
+    slides: bool,
     calls: Sequence[Callable[[float], float]],
     store: CodeStore | None,
     notify: Callable[[str], None],
 ) -> tuple[CompiledFunction, ObserveArguments]:
-    """Return `integrators.runners.observing.observe_rows` as machine code for one system.
+    """Return `observe_rows` of `integrators.runners.observing` as machine code for one system.
 
     Parameters
     ----------
@@ -540,12 +553,16 @@ def observer(
         The system's functions, with arrays as parameters, and scratch space.
     widths : (int, int, int)
         Number of states, of modes of a row and of observed values.
+    kept : range
+        Which of these are kept.
+    slides : bool
+        Whether rows slide on surfaces; otherwise it is `observe_free`, which stops at the first
+        that does.
 
     Returns
     -------
     CompiledFunction
-        To be called with a block, the place of the first observed value that is kept, and the
-        number of rows.
+        To be called with a block, with the first row if they slide, and with the number of rows.
     ObserveArguments
         The example that its block begins with.
     """
@@ -562,7 +579,10 @@ def observer(
         y=OuterArray("f", size),
         mode=OuterArray("i", modes),
         seen=[0.0] * seen,
-        table=table,
+        table=OuterArray("f", len(kept)),
     )
-    entry = EntryPoint("entry", observing.observe_rows, extra=("start", "count"))
+    if slides:
+        entry = EntryPoint("entry", observing.observe_rows, "", (kept.start, "first", "count"))
+    else:
+        entry = EntryPoint("entry", observing.observe_free, FREE, (kept.start, "count"), True)
     return _made(text, rows, [entry], calls, store, notify), rows

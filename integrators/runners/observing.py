@@ -23,21 +23,77 @@ def observe_rows(
     seen: Vector,
     table: list[Vector],
     start: int,
+    first: int,
     count: int,
 ) -> int:
-    """Observe many rows."""
+    """Observe many rows, those before `first` excepted, which do not slide."""
     on = Held(functions, held, sliding)
-    for row in range(count):
+    for row in range(first, count):
         observe_row(observe, on, t[row], y[row], mode[row], seen)
         kept = table[row]
         for k in range(len(kept)):
             kept[k] = seen[start + k]
     if len(sliding.sigma) > 0:
-        for row in range(count - 1):
+        for row in range(max(first - 1, 0), count - 1):
             if is_turn(sliding, t, mode, row):
                 observe_beside(observe, on, t, y, mode, count, row, 1, seen, table, start)
                 observe_beside(observe, on, t, y, mode, count, row + 1, -1, seen, table, start)
     return count
+
+
+def observe_free(
+    observe: Callable[..., Any],
+    p: Any,
+    sliding: Sliding,
+    t: Vector,
+    y: list[Vector],
+    mode: list[list[int]],
+    seen: Vector,
+    table: list[Vector],
+    start: int,
+    count: int,
+) -> int:
+    """Observe the rows before the first that slides on a surface, and return their number."""
+    first = 0
+    while first < count:
+        now, end = mode[first], first + 1
+        for k in range(len(now) - len(sliding.flags), len(now)):
+            if now[k] != 0:
+                return first
+        while end < count and are_equal(now, mode[end]):
+            end += 1
+        observe_alike(observe, p, sliding, t, y, now, seen, table, start, first, end)
+        first = end
+    return count
+
+
+def are_equal(one: list[int], other: list[int]) -> bool:
+    """Return whether the modes of two rows are the same."""
+    differ = 0
+    for k in range(len(one)):
+        differ |= one[k] ^ other[k]
+    return differ == 0
+
+
+def observe_alike(
+    observe: Callable[..., Any],
+    p: Any,
+    sliding: Sliding,
+    t: Vector,
+    y: list[Vector],
+    mode: list[int],
+    seen: Vector,
+    table: list[Vector],
+    start: int,
+    first: int,
+    end: int,
+) -> None:
+    """Observe rows of the same modes; in machine code several side by side."""
+    for row in range(first, end):
+        observe(t[row], y[row], mode, sliding.live, p, seen)
+        kept = table[row]
+        for k in range(len(kept)):
+            kept[k] = seen[start + k]
 
 
 def value_rows(

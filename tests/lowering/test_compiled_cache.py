@@ -123,7 +123,7 @@ def test_the_first_process_compiles_and_says_so_and_the_next_does_not(
     folder, said = warm
     assert NOTE in said, "the wait is explained"
     before = {path: path.stat().st_ino for path in _kept(folder)}
-    assert sorted(path.name.partition("-")[0] for path in before) == ["observe_rows", "record"]
+    assert sorted(path.name.partition("-")[0] for path in before) == ["observe_free", "record"]
     assert _ended(_start(RUN, GMS_FSM_CACHE=str(folder))) == ("equal 24\n", "")
     assert {path: path.stat().st_ino for path in _kept(folder)} == before
     compiled.notify("compiling ...")  # here nobody waits
@@ -180,7 +180,7 @@ def test_functions_in_memory_give_way_when_they_are_many(
     program = lower(stick_slip("signed"), Prescribed("0.1*t"))
     rows = np.array([2.0]), np.zeros((1, 5)), np.zeros((1, 4), dtype=int)
     compiled.observe_rows(program, *rows, range(14))
-    assert [*compiled._observers] == [id(program.functions)]
+    assert [*compiled._observers] == [(id(program.functions), range(14), False)]
 
 
 def _flip(path: Path, source: random.Random) -> None:

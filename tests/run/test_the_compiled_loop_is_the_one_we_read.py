@@ -29,17 +29,20 @@ from gms_fsm import (
     simulate,
     sweep,
 )
+from gms_fsm.charts.parameters import FloatArray
 from gms_fsm.lowering import compiling as compiled
 from gms_fsm.lowering.observing import on_surfaces
 from gms_fsm.lowering.program import lower
 from gms_fsm.run.recording import compiled_run, ready_code
 from gms_fsm.traces import observed
 from integrators.loop import FIRING, Machines
+from integrators.machine_code import calls
 from integrators.machine_code.layout import BlockLayout
 from integrators.runners import columns
+from integrators.runners.observing import observe_free
 from integrators.runners.observing import observe_rows as rows_observed
 from integrators.sliding import Functions
-from tests.corpus import outcome, run, trace
+from tests.corpus import each, outcome, run, trace
 from tests.helpers import CURVE, banging, other_parts, pulled_mass, stick_slip
 
 
@@ -72,10 +75,9 @@ def read(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     def observe_rows(program: Any, t: Any, y: Any, mode: Any, kept: range) -> Any:
         table, seen = np.empty((t.size, len(kept))), np.empty(program.layout.observed.size)
         on = on_surfaces(program, program.ieee, compiled.packed(program.p))
-        observe, rows = program.ieee["observe"], (t, y, mode)
-        rows_observed(
-            on.functions, observe, on.held, on.sliding, *rows, seen, table, kept.start, t.size
-        )
+        observe, rows = program.ieee["observe"], (t, y, mode, seen, table, kept.start)
+        free = observe_free(observe, on.functions.p, on.sliding, *rows, t.size)
+        rows_observed(on.functions, observe, on.held, on.sliding, *rows, free, t.size)
         return table
 
     monkeypatch.setattr(compiled, "engine", engine)
@@ -195,17 +197,36 @@ FUNCTIONS = [
 
 @pytest.mark.every(3)
 @pytest.mark.parametrize("text", FUNCTIONS)
-def test_every_function_at_many_places(text: str) -> None:
+def test_every_function_at_many_places(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compilers turn 8**z into exp2 and z**0.5 into sqrt, which differ in the last bits."""
+    monkeypatch.setattr(calls, "AT_ONCE", 0.0)
     values = _argument_values()
     program = lower(_function(text), Prescribed("0"))
     y = np.column_stack([np.zeros(len(values)), values])
     mode = np.zeros((len(values), program.layout.modes), dtype=np.int64)
-    found = compiled.observe_rows(program, np.zeros(len(values)), y, mode, range(5))
-    wanted, out = np.empty_like(found), [0.0] * 5
+    wanted, out = np.empty((len(values), 5)), [0.0] * 5
     for row, place in enumerate(y.tolist()):
         program.ieee["observe"](0.0, place, [0], program.live, program.p, out)
         wanted[row] = out
-    one, other = wanted[:, 1], found[:, 1]
-    np.testing.assert_array_equal(np.isnan(one), np.isnan(other))  # whatever its payload
+    for _ in range(2):  # one by one, then side by side
+        found = compiled.observe_rows(program, np.zeros(len(values)), y, mode, range(5))
+        same_numbers(wanted[:, 1], found[:, 1])
+
+
+def same_numbers(one: FloatArray, other: FloatArray) -> None:
+    """Assert that two arrays have the same bits; a NaN is a NaN, whatever its payload."""
+    np.testing.assert_array_equal(np.isnan(one), np.isnan(other))
     assert one[~np.isnan(one)].tobytes() == other[~np.isnan(one)].tobytes()
+
+
+@each(("pulled mass", "twelve elements", "lugre slider", "runs down", "system two blocks"))
+def test_rows_side_by_side_show_what_each_of_them_shows(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(calls, "AT_ONCE", 0.0)
+    made = trace(name, "ifelse")
+    one_by_one = observed.Observed(made.program, made.rows, compiled=False)
+    for _ in range(2):  # first by code that is compiled at once
+        side_by_side = observed.Observed(made.program, made.rows, compiled=True)
+        for quantity, wanted in one_by_one.items():
+            same_numbers(wanted, side_by_side[quantity])

@@ -40,7 +40,7 @@ from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.layout import BlockLayout, MemoryBlock, OuterArray
 from integrators.machine_code.script.javascript import javascript_text, script_number, tables_of
-from integrators.machine_code.tree import Local
+from integrators.machine_code.tree import Const, Local
 from integrators.machine_code.tuning import INLINE
 from integrators.runners import columns
 from integrators.runners.compiled import RECORD, is_known
@@ -292,12 +292,12 @@ class RunModule(_Module):
         """Translate the run, what follows from its numbers, and what is observed of its rows."""
         part = self.layout.part
         run = [part(each) for each in RECORD.split()]
-        steps, start = ([NumberValue(Local("i", each)) for each in pair] for pair in (
-            ("steps", "pause"), ("start", "count")))  # fmt: skip
-        translator.entry("record", columns.record, [*run, *steps])
+        names = "steps", "pause", "start", "count"
+        steps, pause, start, count = (NumberValue(Local("i", each)) for each in names)
+        translator.entry("record", columns.record, [*run, steps, pause])
         translator.entry("adapt", adapt, [part(each) for each in OF_A_RUN.split()])
         seen = [part(each) for each in OBSERVED.split()]
-        translator.entry("show", observe_rows, [*seen, *start])
+        translator.entry("show", observe_rows, [*seen, start, NumberValue(Const("i", 0)), count])
         return ["record", "adapt", "show"]
 
     def columns(self) -> Mapping[str, tuple[Any, ...]]:

@@ -60,6 +60,8 @@ class Translator:
     inline : mapping of str to bool, optional
         By a function's name whether it is put inline (if it is short), or not; LLVM decides about
         the others.
+    apart : mapping of str to tuple of str, optional
+        By a function's name its arguments that overlap no others.
 
     Attributes
     ----------
@@ -80,8 +82,12 @@ class Translator:
     ['root_of', 'root']
     """
 
-    def __init__(self, inline: Mapping[str, bool] | None = None) -> None:
-        self.inline = inline or {}
+    def __init__(
+        self,
+        inline: Mapping[str, bool] | None = None,
+        apart: Mapping[str, tuple[str, ...]] | None = None,
+    ) -> None:
+        self.inline, self.apart = inline or {}, apart or {}
         self.module = Module()
         self.origins: dict[str, str] = {}  # by the name of a translation: the function's own
         self.forms = RecordForms()
@@ -235,7 +241,14 @@ class Translator:
         inline = self.inline.get(function.__name__)
         about = (function.__doc__ or "").strip().partition("\n")[0]
         made = TypedFunction(
-            name, tuple(work.parameters), kinds, variables, statements, inline=inline, about=about
+            name,
+            tuple(work.parameters),
+            kinds,
+            variables,
+            statements,
+            inline=inline,
+            about=about,
+            apart=self.apart.get(function.__name__, ()),
         )
         # Other types may have led to the same statements.
         alike = self._made.setdefault((id(function), replace(made, body=())), [])
