@@ -168,9 +168,10 @@ class _Writer:
 
     def parameter(self, local: Local) -> str:
         """Return a parameter with what is known of it."""
-        name, apart = local.name.partition(".")[0], self.function.apart
-        known = " noalias" if name in apart else ""
-        if apart and name == "block":  # it can be read before it is known whether that is needed
+        name, known = local.name.partition(".")[0], ""
+        if name in self.function.apart:
+            known = " noalias"
+        elif self.function.apart and self.module.words and name == "block":
             known = f" align 8 dereferenceable({8 * self.module.words})"
         return f"{_TYPES[local.kind]}{known} %{_name(local.name)}"
 

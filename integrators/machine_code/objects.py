@@ -11,7 +11,7 @@ import threading
 from collections.abc import Collection
 from typing import Any
 
-__all__ = ["Library", "compiled", "compiled_at_once", "target_name"]
+__all__ = ["Library", "compiled", "compiled_at_once", "has_wide_vectors", "target_name"]
 
 _lock = threading.RLock()  # LLVM's settings are those of the process
 
@@ -48,6 +48,12 @@ def target_name() -> str:
     version = ".".join(map(str, llvm.llvm_version_info))
     features = llvm.get_host_cpu_features().flatten()
     return f"{version} {llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features}"
+
+
+@functools.cache
+def has_wide_vectors() -> bool:
+    """Return whether this processor computes eight numbers side by side."""
+    return bool(_binding().get_host_cpu_features().get("avx512f"))
 
 
 def _builder(machine: Any, speed: int, *, vectors: bool = False) -> Any:

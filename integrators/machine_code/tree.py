@@ -429,4 +429,6 @@ class Module:
     tables: list[ConstantTable] = field(default_factory=list)
     callbacks: int = 0
     outer: dict[str, str] = field(default_factory=dict)  # entries of others: kinds of arguments
-    words: int = 0  # of the block
+    # Of the block, if what may be needed is read at once: it pays where eight numbers are computed
+    # side by side, of which one may need it.
+    words: int = 0

@@ -40,7 +40,7 @@ from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.layout import BlockLayout, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
-from integrators.machine_code.objects import Library, target_name
+from integrators.machine_code.objects import Library, has_wide_vectors, target_name
 from integrators.machine_code.tree import Const, Local, OuterEntry
 from integrators.machine_code.tuning import APART, HOT, INLINE, KEEPING
 from integrators.runners import columns, observing, repeating, stepping
@@ -344,7 +344,7 @@ def translated(
 ) -> Translator:
     """Return functions on a block, translated; ``each`` calls the first one for many blocks."""
     translator = Translator(INLINE, APART)
-    translator.module.words = layout.words
+    translator.module.words = layout.words if has_wide_vectors() else 0
     made = [
         translator.entry(
             entry.name,
