@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -139,7 +140,8 @@ class FrictionBank:
         ParameterError, SimulationError
             As in `advance`, or if t is before the present time.
         """
-        forces: FloatArray = self._joints.advance_to(*self._checked(v0, v1), t, self._lines(inputs))
+        v0, v1 = self._checked(v0, v1)
+        forces: FloatArray = self._joints.advance(v0, v1, nan, self._lines(inputs), t)
         return forces
 
     def peek(

@@ -118,6 +118,7 @@ class Joint:
             lost += self.logged
             sample.switches, sample.resumed = 0, True
             self.memory.run()
+            sample.resumed = False
         return lost
 
     def _within(self, error: GMSError) -> GMSError:
@@ -149,9 +150,9 @@ class Joint:
         log = zip(sample.t[:count], sample.machine[:count], sample.edge[:count], strict=True)
         return [ElementSwitch(float(t), int(i), edges[int(edge)].name) for t, i, edge in log]
 
-    def forget(self) -> None:
-        """Empty the log."""
-        self.memory.sample.switches = 0
+    def forget(self, t: float) -> None:
+        """Empty the log; the present time is another."""
+        self.memory.sample.switches, self.memory.sample.end = 0, t
 
     @property
     def speed(self) -> float:

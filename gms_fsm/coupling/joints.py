@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -16,13 +17,21 @@ from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.run.problem import LATEST
 from gms_fsm.run.stepped.going_back import Alone, Snapshot, content_of, in_use
-from gms_fsm.run.stepped.memory import BlockMemory, ListMemory, fast, machine_code
+from gms_fsm.run.stepped.memory import (
+    BlockMemory,
+    ListMemory,
+    fast,
+    machine_code,
+    no_short_calls,
+)
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
 
+# Whether one thread at a time runs Python, and another one goes on only where a call has returned.
+ONE_AT_A_TIME: bool = getattr(sys, "_is_gil_enabled", lambda: True)()
 CHANGE = 1e-4  # of the last velocity, for a derivative by differences
 Lost = dict[Joint, list[ElementSwitch]]  # switches that did not fit into the log of a sample
-# When it began, v0, v1, further inputs, lost switches, and a copy of the state before it.
+# When it began, v0, v1, further inputs, lost switches, and the state before it.
 LastSample = tuple[float, Any, Any, Mapping[str, Line], Lost, Any]
 
 
@@ -32,8 +41,9 @@ class JointGroup:
     def __init__(
         self, joints: Sequence[Joint], memory: BlockMemory | ListMemory, places: Any
     ) -> None:
-        self.joints, self.places = joints, places
+        self.joints, self.places, self.short = joints, places, memory.short
         self.copy, self.take = memory.copy, memory.take
+        self.room, self.keep = memory.room, memory.keep
         self._run, self._sample = memory.run, memory.sample
         lines: Sequence[Any] = memory.lines
         self._v, *others = lines
@@ -52,13 +62,13 @@ class JointGroup:
         mean: bool = False,
     ) -> Any:
         """Advance to t; return the forces there, or their integrals over the sample."""
-        for name, line in self._others:
-            line[0], line[1] = inputs[name]
+        if inputs:
+            for name, line in self._others:
+                line[0], line[1] = inputs[name]
         if self._entering:
             self._enter(t, {**inputs, "v": (v0, v1)})
         v, sample = self._v, self._sample
         sample.end, v[0], v[1] = t, v0, v1
-        sample.resumed = False
         if mean:
             sample.mean = True
         if self._run():
@@ -102,8 +112,17 @@ class JointGroups:
         """Return the present state."""
         return [group.copy() for group in self.groups]
 
+    def room(self) -> Any:
+        """Return memory for a state."""
+        return [group.room() for group in self.groups]
+
+    def keep(self, room: Any) -> None:
+        """Write the present state into what `room` returned."""
+        for group, each in zip(self.groups, room, strict=True):
+            group.keep(each)
+
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned."""
+        """Return to what `copy` returned, or `keep` wrote."""
         for group, each in zip(self.groups, copy, strict=True):
             group.take(each)
 
@@ -150,57 +169,56 @@ class Joints:
             groups.append(JointGroup(mine, memory, places if len(places) > 1 else places[0]))
         self.each = [joints[i] for i in range(len(given))]
         self.inputs = tuple(sorted({name for joint in self.each for name in joint.inputs}))
-        together: JointGroup | JointGroups = JointGroups(groups) if several else groups[0]
-        self._step, self._copy, self._take = together.step, together.copy, together.take
+        together: JointGroup | JointGroups = JointGroups(groups)
+        if len(groups) == 1 and several == (len(given) > 1):  # all values as they come
+            together = groups[0]
+        self._step, self._copy = together.step, together.copy
+        self._room, self._keep, self._take = together.room, together.keep, together.take
+        self._spare = self._room()
         self._several = several
-        self.alone = Alone()
-        self.t = starts[0].t_start
-        self._last: LastSample | None = None
+        self.short = groups[0].short if groups[0] is together else no_short_calls()
+        if self.inputs or self.each[0].enters or not ONE_AT_A_TIME:
+            self.short.record.busy = 1
+        self.alone = Alone(self.short.record)
+        self._found: LastSample | None = None  # unless the last call was a short one
 
     # ------------------------------------------------------------------ samples
-    def advance(self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Any]) -> Any:
-        """Advance by a sample; if that fails everything is as before."""
-        if not self.alone.acquire(False):  # as `with self.alone`, in a third of the time
-            raise in_use()
-        try:
-            now = self.t
-            end = now + dt
-            return self._commit(v0, v1, end if now < end < LATEST else end_of(now, dt), inputs)
-        finally:
-            self.alone.leave()
+    @property
+    def t(self) -> float:
+        """The present time."""
+        end: float = self.each[0].memory.sample.end
+        return end
 
-    def advance_to(self, v0: Any, v1: Any, t: Any, inputs: Mapping[str, Any]) -> Any:
-        """Advance to a time that is not before the present one."""
+    def advance(
+        self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Line], t: Any = None
+    ) -> Any:
+        """Advance by a sample, or (dt is NaN) to t; if that fails everything is as before."""
         with self.alone:
-            return self._commit(v0, v1, end_at(self.t, t), inputs)
+            now, before, found, short = self.t, self._spare, self._found, self.short.record.last
+            end = end_of(now, dt) if dt == dt else end_at(now, t)
+            lost: Lost = {}
+            self._keep(before)
+            try:
+                force = self._step(v0, v1, end, inputs, lost, now)
+                self._found = now, v0, v1, inputs, lost, before
+                self.short.record.last = False
+                self._spare = self._room() if found is None else found[5]
+            except BaseException:  # Ctrl-C, too
+                self._take(before)
+                self._found, self.short.record.last = found, short
+                raise
+            return force
 
-    def peek(self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Any]) -> Any:
+    def peek(self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Line]) -> Any:
         """Return the forces at the end of a sample, and stay."""
-        if not self.alone.acquire(False):
-            raise in_use()
-        try:
-            now = self.t
+        with self.alone:
+            now, before = self.t, self._spare
             end = _in_reach(now + dt)
-            before = self._copy()
+            self._keep(before)
             try:
                 return self._step(v0, v1, end, inputs, {}, now)
             finally:
                 self._take(before)
-        finally:
-            self.alone.leave()
-
-    def _commit(self, v0: Any, v1: Any, end: float, inputs: Mapping[str, Line]) -> Any:
-        t, last = self.t, self._last
-        before = self._copy()
-        lost: Lost = {}
-        try:
-            force = self._step(v0, v1, end, inputs, lost, t)
-            self.t, self._last = end, (t, v0, v1, inputs, lost, before)
-        except BaseException:  # Ctrl-C, too
-            self._take(before)
-            self.t, self._last = t, last
-            raise
-        return force
 
     def send(self, event: str) -> None:
         """Let an event wait for the next sample of all joints that wait for it."""
@@ -216,7 +234,8 @@ class Joints:
     @property
     def switches(self) -> list[tuple[ElementSwitch, ...]]:
         """Of each joint the edges taken in the last sample."""
-        lost: Lost = {} if self._last is None else self._last[4]
+        last = self._last()
+        lost: Lost = {} if last is None else last[4]
         return [(*lost.get(joint, ()), *joint.logged) for joint in self.each]
 
     @property
@@ -243,18 +262,28 @@ class Joints:
         speeds = [joint.speed for joint in self.each]
         return np.array(speeds) if self._several else speeds[0]
 
+    def _last(self) -> LastSample | None:
+        """Return the last sample, if there is one."""
+        _, _, _, record, kept = self.short
+        if record.last:
+            v0, v1 = map(float, self.each[0].memory.sample.inputs[0])
+            return record.begin, v0, v1, {}, {}, kept[record.row]
+        return self._found
+
     def _sample(self) -> LastSample:
-        if self._last is None:
+        last = self._last()
+        if last is None:
             raise ParameterError("there is no last sample", advice="call advance first")
-        return self._last
+        return last
 
     def _again(self, v1: Any, *, mean: bool = False) -> Any:
         """Return the force, or its integral, had the last velocity been v1."""
         _, v0, _, inputs, _, before = self._sample()
-        now = self._copy()
+        end, now = self.t, self._spare
+        self._keep(now)
         try:
             self._take(before)
-            return self._step(v0, v1, self.t, inputs, {}, self.t, mean=mean)
+            return self._step(v0, v1, end, inputs, {}, end, mean=mean)
         finally:
             self._take(now)
 
@@ -301,9 +330,9 @@ class Joints:
 
     def _moved_to(self, t: float) -> None:
         """Forget the last sample: the memory has been given another state."""
-        self.t, self._last = t, None
+        self._found, self.short.record.last = None, False
         for joint in self.each:
-            joint.forget()
+            joint.forget(t)
 
 
 def made_again(kind: Any, given: Any, arguments: Mapping[str, Any], array: FloatArray) -> Any:

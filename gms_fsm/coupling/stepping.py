@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
+from math import inf, nan
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -69,6 +69,7 @@ class FrictionState:
         asked = Asked(t, initial, rtol)
         self._joints = Joints([model_or_contact], [asked], engine, several=False)
         (self._joint,) = self._joints.each
+        self._given, self._advance, self._peek, *_ = self._joints.short
 
     def __repr__(self) -> str:
         return f"<FrictionState of {self.model!r} at t = {self.t!r} s>"
@@ -110,10 +111,14 @@ class FrictionState:
         SimulationError
             If it cannot continue. In both cases the friction is as it was before.
         """
+        # Machine code does all that is usual: no other thread comes between what is given and it.
+        if not inputs and isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float):
+            given = self._given
+            given[0], given[1], given[2] = v0, v1, dt
+            if (force := self._advance()) < inf:
+                return force
         v0, v1, dt = _checked(v0, v1, dt)
-        if inputs or self._joint.inputs:
-            inputs = self._lines(inputs)
-        force: float = self._joints.advance(v0, v1, dt, inputs)
+        force = self._joints.advance(v0, v1, dt, self._lines(inputs))
         return force
 
     def advance_to(self, v0: float, v1: float, t: float, **inputs: Line) -> float:
@@ -137,7 +142,7 @@ class FrictionState:
             As in `advance`, or if t is before the present time.
         """
         v0, v1, _ = _checked(v0, v1, 0.0)
-        force: float = self._joints.advance_to(v0, v1, t, self._lines(inputs))
+        force: float = self._joints.advance(v0, v1, nan, self._lines(inputs), t)
         return force
 
     def peek(self, v0: float, v1: float, dt: float, **inputs: Line) -> float:
@@ -158,10 +163,13 @@ class FrictionState:
         ParameterError, SimulationError
             As in `advance`.
         """
+        if not inputs and isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float):
+            given = self._given
+            given[0], given[1], given[2] = v0, v1, dt
+            if (force := self._peek()) < inf:
+                return force
         v0, v1, dt = _checked(v0, v1, dt)
-        if inputs or self._joint.inputs:
-            inputs = self._lines(inputs)
-        force: float = self._joints.peek(v0, v1, dt, inputs)
+        force = self._joints.peek(v0, v1, dt, self._lines(inputs))
         return force
 
     def send(self, event: str) -> None:
@@ -282,9 +290,6 @@ class FrictionState:
 
 def _checked(v0: Any, v1: Any, dt: Any) -> tuple[float, float, float]:
     """Return the arguments of a sample as floats, or refuse them."""
-    usual = isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float)
-    if usual and isfinite(v0) and isfinite(v1) and isfinite(dt) and dt >= 0.0:
-        return v0, v1, dt
     return _finite("v0", v0), _finite("v1", v1), checked_scalar("dt", dt, ">= 0")
 
 

@@ -20,14 +20,18 @@ NOT_INLINE = [
 ]  # fmt: skip
 # A step calls the flow seven times. Inline, the slopes stay in registers: a tenth of the time. Each
 # row is observed: a tenth of the time, too.
-ALWAYS = "flow", "flow_live", "flow_on", "observe", "weighted_sum"
+ALWAYS = (
+    "flow", "flow_live", "flow_on", "observe", "weighted_sum",
+    "copy_words", "keep_words", "take_words",  # there it is known that they do not overlap
+)  # fmt: skip
 INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(ALWAYS, True)
 # Arrays that nothing else that these functions are given overlaps: what is read stays in registers.
 APART = {"observe_alike": ("seen", "table")}
 # Every step calls these; an entry that is among them has no other kind of function.
 HOT = {
-    "advance", "_along", "first_change", "_bracket", "_error", "interpolate", "margins",
-    "observe_free", "_probe", "rate_in_lanes", "_search", "slope_in_lanes", "switch", "take_step",
+    "advance", "advance_by", "peek_by", "_along", "first_change", "_bracket", "_error",
+    "interpolate", "margins", "observe_free", "_probe", "rate_in_lanes", "_search",
+    "slope_in_lanes", "switch", "take_step",
 }  # fmt: skip
 # What is called in the midst of a step saves the registers it uses: its callers use nearly all.
 KEEPING = {"exp", "margins"}

@@ -37,7 +37,7 @@ from integrators.machine_code.front_end import (
     work,
 )
 from integrators.machine_code.front_end.translate import Translator
-from integrators.machine_code.front_end.values import NumberValue
+from integrators.machine_code.front_end.values import ArrayValue, NumberValue
 from integrators.machine_code.layout import BlockLayout, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, has_wide_vectors, target_name
@@ -45,7 +45,7 @@ from integrators.machine_code.tree import Const, Local, OuterEntry
 from integrators.machine_code.tuning import APART, HOT, INLINE, KEEPING
 from integrators.runners import columns, observing, repeating, stepping
 from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
-from integrators.runners.stepping import Sample
+from integrators.runners.stepping import Sample, ShortCall
 from integrators.sliding import Functions, Held, Sliding
 from integrators.steps import Coefficients
 from integrators.switching import jolts, sliding_bounds
@@ -109,6 +109,8 @@ class EntryPoint(NamedTuple):
         Integers that are passed besides the block, by name, and those that are known.
     vectors : bool
         Whether it computes numbers side by side.
+    words : int
+        If not 0, so many words at the beginning of the block are its last argument, too.
     """
 
     name: str
@@ -116,10 +118,12 @@ class EntryPoint(NamedTuple):
     parts: str = ""
     extra: tuple[str | int, ...] = ()
     vectors: bool = False
+    words: int = 0
 
 
 RECORD = "functions machines buffers log recorded tally"
 FREE = "observe functions.p sliding t y mode seen table"
+STEP = "functions machines buffers sample"
 
 
 class StepArguments(NamedTuple):
@@ -129,6 +133,16 @@ class StepArguments(NamedTuple):
     machines: Machines
     buffers: Buffers
     sample: Sample
+
+
+class ShortArguments(NamedTuple):
+    """The arguments of `integrators.runners.stepping.advance_by`, without the last one."""
+
+    functions: Functions
+    machines: Machines
+    buffers: Buffers
+    sample: Sample
+    short: ShortCall
 
 
 class ObserveArguments(NamedTuple):
@@ -291,7 +305,7 @@ def _object(
     store: CodeStore | None,
     notify: Callable[[str], None],
     *,
-    each: bool = False,
+    each: int = 0,
     at_once: bool = False,
 ) -> bytes:
     """Return machine code from the store, or compile it."""
@@ -316,7 +330,7 @@ def _object(
 
 
 def _written(
-    layout: BlockLayout, entries: Sequence[EntryPoint], each: bool
+    layout: BlockLayout, entries: Sequence[EntryPoint], each: int
 ) -> tuple[str, set[str] | None]:
     """Return the text of functions on a block, and the names of the hot ones; no tree stays.
 
@@ -339,10 +353,8 @@ def _no_collections() -> Iterator[None]:
             gc.enable()
 
 
-def translated(
-    layout: BlockLayout, entries: Sequence[EntryPoint], *, each: bool = False
-) -> Translator:
-    """Return functions on a block, translated; ``each`` calls the first one for many blocks."""
+def translated(layout: BlockLayout, entries: Sequence[EntryPoint], *, each: int = 0) -> Translator:
+    """Return functions on a block; ``each`` calls the first one for blocks of so many words."""
     translator = Translator(INLINE, APART)
     translator.module.words = layout.words if has_wide_vectors() else 0
     made = [
@@ -352,15 +364,20 @@ def translated(
             [
                 *map(layout.part, entry.parts.split() or layout.value.fields),
                 *(
-                    NumberValue(Local("i", each) if isinstance(each, str) else Const("i", each))
-                    for each in entry.extra
+                    NumberValue(Local("i", extra) if isinstance(extra, str) else Const("i", extra))
+                    for extra in entry.extra
+                ),
+                *(
+                    [ArrayValue("i", (Const("i", n),), Local("p", "block"))]
+                    if (n := entry.words)
+                    else []
                 ),
             ],
         )
         for entry in entries
     ]
     if each:
-        translator.for_each("each", made[0], layout.words)
+        translator.for_each("each", made[0], each)
     return translator
 
 
@@ -435,17 +452,23 @@ class CompiledStepper:
     ----------
     layout : BlockLayout
         Of a block, which contains all its arrays.
+    short : BlockLayout
+        Of a block for the latter two, which begins in the same way.
     library : Library
-        Contains `entry` and `each`.
+        Contains `entry`, `each`, `advance_by` and `peek_by`.
     """
 
     layout: BlockLayout
+    short: BlockLayout
     library: Library
 
     def __post_init__(self) -> None:
-        # It takes microseconds: to release the GIL would take a tenth of them.
+        # They take microseconds: to release the GIL would take a tenth of them.
         one = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
         self.one = one(self.library.address("entry"))
+        force = ctypes.PYFUNCTYPE(ctypes.c_double, ctypes.c_void_p)
+        self.advance = force(self.library.address("advance_by"))
+        self.peek = force(self.library.address("peek_by"))
         each = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
         self.each = each(self.library.address("each"))
 
@@ -453,7 +476,7 @@ class CompiledStepper:
 def stepper(
     text: str, arguments: StepArguments, store: CodeStore | None, notify: Callable[[str], None]
 ) -> CompiledStepper:
-    """Return `integrators.runners.stepping.step_to` as machine code for one system.
+    """Return the functions of `integrators.runners.stepping` as machine code for one system.
 
     Parameters
     ----------
@@ -467,13 +490,19 @@ def stepper(
     CompiledStepper
         ``one(address)`` returns what `step_to` returns; ``each(address, count)`` calls it for many
         blocks, one after the other in memory, and returns the sum of what it returns.
+        ``advance(address)`` and ``peek(address)`` return what `advance_by` and `peek_by` return.
     """
     layout = BlockLayout(arguments, is_known)
-    entries = [EntryPoint("entry", stepping.step_to)]
-    name = _name(text, arguments, layout, entries)
-    return CompiledStepper(
-        layout, Library(_object(name, layout, entries, store, notify, each=True))
-    )
+    whole = ShortArguments(*arguments, stepping.short_call(layout.words))
+    short = BlockLayout(whole, is_known)
+    entries = [
+        EntryPoint("entry", stepping.step_to, STEP),
+        EntryPoint("advance_by", stepping.advance_by, f"{STEP} short", words=layout.words),
+        EntryPoint("peek_by", stepping.peek_by, f"{STEP} short", words=layout.words),
+    ]
+    name = _name(text, whole, short, entries)
+    library = Library(_object(name, short, entries, store, notify, each=layout.words))
+    return CompiledStepper(layout, short, library)
 
 
 def example(functions: Functions, machines: Machines, b: Buffers, observed: int, recorded: Recorded,

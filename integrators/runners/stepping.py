@@ -86,6 +86,102 @@ class Sample:
     clocks: Clocks
 
 
+@dataclass(slots=True, eq=False)
+class ShortCall:
+    """What `advance_by` and `peek_by` are given, and what they keep."""
+
+    v0: float  # the only input, at the beginning and at the end
+    v1: float
+    dt: float
+    latest: float  # time at which a sample may end
+    busy: int  # not 0: each call needs a closer look
+    begin: float  # of the last sample
+    last: bool  # whether that was advanced by `advance_by`
+    row: int  # 0 or 1: what holds the state before it, `even` or `odd`
+    even: list[int]
+    odd: list[int]
+
+
+def short_call(words: int, latest: float = 0.0) -> ShortCall:
+    """Return the beginning of short calls on a state of so many words."""
+    return ShortCall(0.0, 0.0, 0.0, latest, 0, 0.0, False, 0, [0] * words, [0] * words)
+
+
+def advance_by(
+    functions: Functions, machines: Machines, b: Buffers, sample: Sample, short: ShortCall,
+    words: list[int],
+) -> float:  # fmt: skip
+    """Advance by a sample and return the force; if that needs a closer look, stay: INFINITY.
+
+    The words are all that a sample changes.
+    """
+    begin, end = sample.end, sample.end + short.dt
+    if not (begin < end and _is_plain(short, end)):
+        return INFINITY
+    keep_words(short, words)
+    if _fails(functions, machines, b, sample, short, end):
+        take_words(short, words)
+        return INFINITY
+    short.begin = begin
+    short.row = 1 - short.row
+    short.last = True
+    return sample.force
+
+
+def peek_by(
+    functions: Functions, machines: Machines, b: Buffers, sample: Sample, short: ShortCall,
+    words: list[int],
+) -> float:  # fmt: skip
+    """Return what `advance_by` would return, and stay."""
+    end = sample.end + short.dt
+    if not _is_plain(short, end):
+        return INFINITY
+    keep_words(short, words)
+    failed = _fails(functions, machines, b, sample, short, end)
+    force = sample.force
+    take_words(short, words)
+    return INFINITY if failed else force
+
+
+def _is_plain(short: ShortCall, end: float) -> bool:
+    """Return whether the arguments need no closer look."""
+    finite = abs(short.v0) < INFINITY and abs(short.v1) < INFINITY
+    return short.busy == 0 and finite and short.dt >= 0.0 and end < short.latest
+
+
+def _fails(
+    functions: Functions, machines: Machines, b: Buffers, sample: Sample, short: ShortCall,
+    end: float,
+) -> bool:  # fmt: skip
+    """Advance to a time; return whether that fails, or takes further calls."""
+    sample.end = end
+    sample.inputs[0][0] = short.v0
+    sample.inputs[0][1] = short.v1
+    return step_to(functions, machines, b, sample) != 0 or not abs(sample.force) < INFINITY
+
+
+def keep_words(short: ShortCall, words: list[int]) -> None:
+    """Keep the state, not where the one before the last sample is."""
+    if short.row == 1:
+        copy_words(words, short.even)
+    else:
+        copy_words(words, short.odd)
+
+
+def take_words(short: ShortCall, words: list[int]) -> None:
+    """Return to what `keep_words` kept."""
+    if short.row == 1:
+        copy_words(short.even, words)
+    else:
+        copy_words(short.odd, words)
+
+
+def copy_words(source: list[int], target: list[int]) -> None:
+    """Copy words to others."""
+    for k in range(len(source)):
+        target[k] = source[k]
+
+
 def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample) -> int:
     """Advance to the end of a sample."""
     now, memory, observe, end = b.now, b.memory, machines.observe, sample.end

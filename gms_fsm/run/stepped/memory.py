@@ -21,7 +21,14 @@ from integrators import hybrid
 from integrators.loop import Buffers, Machines
 from integrators.machine_code.records import numbers_in, numbers_of, put_numbers
 from integrators.runners import states
-from integrators.runners.stepping import Clocks, Sample, restart, step_to
+from integrators.runners.stepping import (
+    Clocks,
+    Sample,
+    ShortCall,
+    restart,
+    short_call,
+    step_to,
+)
 from integrators.sliding import Functions
 
 if TYPE_CHECKING:
@@ -78,6 +85,21 @@ class JointMemory(NamedTuple):
         return {f"input {k}": self.tables[2 * k + 1] for k in range(self.sample.given)}
 
 
+class ShortCalls(NamedTuple):
+    """Calls for one joint with one input, which return the force; see `advance_by`."""
+
+    given: Any  # v0, v1 and dt
+    advance: Callable[[], float]
+    peek: Callable[[], float]
+    record: ShortCall
+    kept: tuple[Any, ...] = ()  # states
+
+
+def no_short_calls() -> ShortCalls:
+    """Return calls of which each needs a closer look."""
+    return ShortCalls([0.0] * 3, lambda: math.inf, lambda: math.inf, short_call(0))
+
+
 def fast() -> bool:
     """Return whether machine code can be made here."""
     return all(map(importlib.util.find_spec, ("llvmlite", "platformdirs")))
@@ -99,14 +121,20 @@ class ListMemory:
         buffers, self.sample = prepared(start, waits=waits)
         self.run = functools.partial(step_to, functions, machines, buffers, self.sample)
         self.each = (JointMemory(buffers, functions.p[2], self.sample, self.run),)
-        self.lines = self.sample.inputs
+        self.lines, self.short = self.sample.inputs, no_short_calls()
 
     def copy(self) -> Any:
         """Return the present state."""
         return {name: list(place) for name, place in self.each[0].whole().items()}
 
+    room = staticmethod(dict)
+
+    def keep(self, room: Any) -> None:
+        """Write the present state into what `room` returned."""
+        room.update(self.copy())
+
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned."""
+        """Return to what `copy` returned, or `keep` wrote."""
         self.each[0].put_whole(copy)
 
 
@@ -177,31 +205,55 @@ class BlockMemory:
 
     def __init__(self, starts: Sequence[Problem], *, waits: bool = False) -> None:
         from integrators.machine_code.layout import MemoryBlock
+        from integrators.runners.compiled import ShortArguments
 
         code, count = machine_code(starts[0], waits=waits), len(starts)
-        zeros: Any = np.zeros(count * code.layout.words, dtype=np.int64)
-        self._words, self._view = zeros, memoryview(zeros).cast("B")
-        self.copy = self._view.tobytes  # in half the time of a copy of an array
+        alone = count == 1
+        layout, size = code.short if alone else code.layout, code.layout.words
+        words: Any = np.zeros((count, layout.words), dtype=np.int64)
         each = []
-        for start, words in zip(starts, self._words.reshape(count, -1), strict=True):
-            block = MemoryBlock(code.layout, arguments_of(start, waits=waits), words=words)
+        for start, row in zip(starts, words, strict=True):
+            arguments: Any = arguments_of(start, waits=waits)
+            if alone:
+                arguments = ShortArguments(*arguments, short_call(size, LATEST))
+            block = MemoryBlock(layout, arguments, words=row)
             made = block.contents
             block.update(made)  # numbers; there are no columns
             run = functools.partial(code.one, block.address)
             each.append(JointMemory(made.buffers, made.functions.p[2], made.sample, run))
-        self.each = each
-        # Items of a memoryview are written in half the time of those of an array.
-        view: Any = memoryview if count == 1 else functools.partial(_across, self._words, count)
-        first = each[0].sample
-        self.lines = [*map(view, first.inputs)]
-        blocks = self._words.reshape(count, -1)
-        self.sample: Any = first if count == 1 else SamplesAcross(blocks, code.layout.offset)
-        address = self._words.ctypes.data
-        self.run = each[0].run if count == 1 else functools.partial(code.each, address, count)
+        self.each, self.run, self.short = each, each[0].run, no_short_calls()
+        self.sample: Any = each[0].sample
+        if alone:
+            # A memoryview is read, written and copied in half the time of an array.
+            self._state: Any = memoryview(words[0, :size]).cast("B")
+            self.copy = self._state.tobytes
+            self.lines = [*map(memoryview, self.sample.inputs)]
+            first = layout.offset("short.v0")
+            self.short = ShortCalls(
+                memoryview(words[0, first : first + 3].view(float)),
+                functools.partial(code.advance, block.address),
+                functools.partial(code.peek, block.address),
+                made.short,
+                tuple(memoryview(each).cast("B") for each in (made.short.even, made.short.odd)),
+            )
+        else:
+            self._state, self.copy = words, words.copy
+            self.lines = [_across(words, line) for line in self.sample.inputs]
+            self.sample = SamplesAcross(words, layout.offset)
+            self.run = functools.partial(code.each, words.ctypes.data, count)
+
+    def room(self) -> Any:
+        """Return memory for a state, so that none need be found for each one."""
+        many = len(self.each) > 1
+        return np.empty_like(self._state) if many else memoryview(bytearray(self._state))
+
+    def keep(self, room: Any) -> None:
+        """Write the present state into what `room` returned."""
+        room[:] = self._state
 
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned."""
-        self._view[:] = copy
+        """Return to what `copy` returned, or `keep` wrote."""
+        self._state[:] = copy
 
 
 class SamplesAcross:
@@ -213,17 +265,16 @@ class SamplesAcross:
         vars(self)["columns"] = {name: words[k][:, offset(f"sample.{name}")] for name, k in kinds}
 
     def __getattr__(self, name: str) -> Any:
-        return vars(self)["columns"][name]
+        return vars(self)["columns"][name].copy()
 
     def __setattr__(self, name: str, value: Any) -> None:
         vars(self)["columns"][name][...] = value
 
 
-def _across(words: Any, count: int, array: Any) -> Any:
+def _across(blocks: Any, array: Any) -> Any:
     """Return a view of an array in the first block and those in its place in the other blocks."""
-    place = (array.ctypes.data - words.ctypes.data) // words.itemsize
-    blocks = words.view(array.dtype).reshape(count, -1)
-    return blocks[:, place : place + array.size].T
+    place = (array.ctypes.data - blocks.ctypes.data) // blocks.itemsize
+    return blocks.view(array.dtype)[:, place : place + array.size].T
 
 
 _known: dict[Any, tuple[MachineCode, Any]] = {}
