@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from math import nan
+from math import inf, isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ from gms_fsm.foundation.arguments import listed, refusing
 from gms_fsm.run.stepped.going_back import Snapshot
 from gms_fsm.systems.models import Model
 from gms_fsm.systems.system import Contact
+
+FLOAT = np.dtype(np.float64)
 
 
 @refusing(quick=("advance", "advance_to", "peek"))
@@ -73,6 +75,7 @@ class FrictionBank:
                 )
         asked = [Asked(t, first, rtol) for first in firsts]
         self._joints = Joints(given, asked, engine, several=True)
+        self._shape = (len(given),)
 
     def __len__(self) -> int:
         return len(self._joints.each)
@@ -114,8 +117,8 @@ class FrictionBank:
         SimulationError
             If a joint cannot continue. In both cases all joints are as they were before.
         """
-        time = checked_scalar("dt", dt, ">= 0")
-        forces: FloatArray = self._joints.advance(*self._checked(v0, v1), time, self._lines(inputs))
+        v0, v1 = self._checked(v0, v1)
+        forces: FloatArray = self._joints.advance(v0, v1, _time(dt), self._lines(inputs))
         return forces
 
     def advance_to(
@@ -164,8 +167,8 @@ class FrictionBank:
         ParameterError, SimulationError
             As in `advance`.
         """
-        time = checked_scalar("dt", dt, ">= 0")
-        forces: FloatArray = self._joints.peek(*self._checked(v0, v1), time, self._lines(inputs))
+        v0, v1 = self._checked(v0, v1)
+        forces: FloatArray = self._joints.peek(v0, v1, _time(dt), self._lines(inputs))
         return forces
 
     def send(self, event: str) -> None:
@@ -183,7 +186,14 @@ class FrictionBank:
         """
         self._joints.send(event)
 
-    def _checked(self, v0: ArrayLike, v1: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def _checked(self, v0: Any, v1: Any) -> tuple[FloatArray, FloatArray]:
+        """Return copies with one finite number per joint."""
+        if type(v0) is type(v1) is np.ndarray:
+            first, last = v0.copy(), v1.copy()
+            usual = first.dtype is last.dtype is FLOAT and first.shape == last.shape == self._shape
+            # A sum in which all numbers are is not finite if one of them is not.
+            if usual and isfinite(first.dot(last)):
+                return first, last
         return self._row("v0", v0), self._row("v1", v1)
 
     def _lines(self, inputs: Mapping[str, Any]) -> dict[str, Line]:
@@ -194,10 +204,6 @@ class FrictionBank:
 
     def _row(self, name: str, given: ArrayLike) -> FloatArray:
         """Return a copy with one finite number per joint."""
-        if type(given) is np.ndarray and given.dtype == np.float64 and given.shape == (len(self),):
-            copy: FloatArray = given.copy()
-            if np.isfinite(copy).all():
-                return copy
         made = checked_array(name, given, None, "finite")
         if made.size != len(self):
             raise ParameterError(
@@ -300,3 +306,8 @@ class FrictionBank:
             If it cannot be such an array; the state stays as it was.
         """
         self._joints.from_array(array)
+
+
+def _time(dt: Any) -> float:
+    """Return the length of a sample, or refuse it."""
+    return dt if type(dt) is float and 0.0 <= dt < inf else checked_scalar("dt", dt, ">= 0")

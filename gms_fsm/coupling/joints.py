@@ -16,9 +16,10 @@ from gms_fsm.coupling.steppable import start_of
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.run.problem import LATEST
-from gms_fsm.run.stepped.going_back import Alone, Snapshot, content_of, in_use
+from gms_fsm.run.stepped.going_back import Alone, Snapshot, content_of
 from gms_fsm.run.stepped.memory import (
     BlockMemory,
+    BlocksMemory,
     ListMemory,
     fast,
     machine_code,
@@ -39,7 +40,7 @@ class JointGroup:
     """Joints in one memory, advanced by one call; of one joint, all values are numbers."""
 
     def __init__(
-        self, joints: Sequence[Joint], memory: BlockMemory | ListMemory, places: Any
+        self, joints: Sequence[Joint], memory: BlockMemory | BlocksMemory | ListMemory, places: Any
     ) -> None:
         self.joints, self.places, self.short = joints, places, memory.short
         self.copy, self.take = memory.copy, memory.take
@@ -148,7 +149,7 @@ class Joints:
         several: bool,
     ) -> None:
         self.engine = checked_engine(engine)
-        kind = BlockMemory if self.engine == "compiled" else ListMemory
+        compiled = self.engine == "compiled"
         starts = []
         for i, each in enumerate(given):
             try:
@@ -157,11 +158,12 @@ class Joints:
                 raise error.inside(f"models[{i}]") if several else error from None
         alike: dict[Any, list[int]] = {}  # joints that share their machine code share a call
         for i, start in enumerate(starts):
-            key = machine_code(start) if kind is BlockMemory else i
+            key = machine_code(start) if compiled else i
             alike.setdefault(key, []).append(i)
         groups, joints = [], dict[int, Joint]()
         for places in alike.values():
-            memory = kind([starts[i] for i in places])
+            many = BlocksMemory if len(places) > 1 else BlockMemory
+            memory = (many if compiled else ListMemory)([starts[i] for i in places])
             for i, own in zip(places, memory.each, strict=True):
                 name = f"joint {i}" if several else ""
                 joints[i] = Joint(given[i], asked[i], starts[i], own, name)

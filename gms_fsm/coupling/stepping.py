@@ -115,11 +115,12 @@ class FrictionState:
         if not inputs and isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float):
             given = self._given
             given[0], given[1], given[2] = v0, v1, dt
-            if (force := self._advance()) < inf:
+            force = self._advance()
+            if force < inf:
                 return force
         v0, v1, dt = _checked(v0, v1, dt)
-        force = self._joints.advance(v0, v1, dt, self._lines(inputs))
-        return force
+        found: float = self._joints.advance(v0, v1, dt, self._lines(inputs))
+        return found
 
     def advance_to(self, v0: float, v1: float, t: float, **inputs: Line) -> float:
         """Advance to a time; see `advance`.
@@ -166,11 +167,12 @@ class FrictionState:
         if not inputs and isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float):
             given = self._given
             given[0], given[1], given[2] = v0, v1, dt
-            if (force := self._peek()) < inf:
+            force = self._peek()
+            if force < inf:
                 return force
         v0, v1, dt = _checked(v0, v1, dt)
-        force = self._joints.peek(v0, v1, dt, self._lines(inputs))
-        return force
+        found: float = self._joints.peek(v0, v1, dt, self._lines(inputs))
+        return found
 
     def send(self, event: str) -> None:
         """Send an event: edges that wait for it are asked at the beginning of the next sample.

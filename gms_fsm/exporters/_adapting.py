@@ -13,7 +13,7 @@ from gms_fsm.language import names_in, spell
 from gms_fsm.lowering.adapting import Adapting, adapt
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.recording.following import adapting_of
-from gms_fsm.run.stepped.memory import arguments_of
+from gms_fsm.run.stepped.memory import MOST_IN_EXPORTS, arguments_of
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout
 from integrators.runners.compiled import is_known
@@ -45,7 +45,7 @@ class ExportArguments(NamedTuple):
 
 def step_arguments(start: Problem) -> tuple[ExportArguments, BlockLayout]:
     """Return the contents of the block at a start, and where everything is in it."""
-    step: tuple[Any, Any, Any, Any] = arguments_of(start)
+    step: tuple[Any, Any, Any, Any] = arguments_of(start, most=MOST_IN_EXPORTS)
     made = ExportArguments(*step, adapting_of(start))
     return made, BlockLayout(made, is_known)
 

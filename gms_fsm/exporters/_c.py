@@ -30,7 +30,7 @@ from gms_fsm.exporters.plain.c import C_WORDS
 from gms_fsm.foundation.text import visible
 from gms_fsm.run.problem import LATEST, Problem
 from gms_fsm.run.stepped.failing import FAILURES
-from gms_fsm.run.stepped.memory import MOST_SWITCHES
+from gms_fsm.run.stepped.memory import MOST_IN_EXPORTS
 from integrators.loop import TOO_MANY_STEPS
 from integrators.machine_code.c99 import number_text
 from integrators.machine_code.front_end.translate import Translator
@@ -140,7 +140,7 @@ class _Text:
             version=__version__,
             inputs=", ".join(made.inputs) or "none",
             fields="\n".join(fields),
-            log_length=MOST_SWITCHES,
+            log_length=MOST_IN_EXPORTS,
             engine=self.block.declared(),
             max_steps=self.start.options.max_steps,
             bad_argument=BAD_ARGUMENT,

@@ -206,13 +206,16 @@ def test_a_sample_that_fails_leaves_it_as_it_was(engine: str) -> None:
     """The flow is NaN beyond a point; it can go another way."""
     friction = FrictionState(ROOT, engine=engine)
     friction.advance(0.1, 0.1, 1.0)
-    before = friction.to_array()
+    before, found = friction.to_array(), (friction.mean_force, friction.dF_dv)
     with pytest.raises(
         SimulationError, match=r"as it was before the call, at t = 1\.0 s"
     ) as caught:
         friction.advance(0.1, 0.1, 100.0)
     assert ".trace" not in str(caught.value)
+    with pytest.raises(SimulationError):
+        friction.peek(0.1, 0.1, 100.0)
     np.testing.assert_array_equal(friction.to_array(), before)
+    assert (friction.mean_force, friction.dF_dv) == found
     assert friction.advance(0.1, -0.1, 1.0) > 0.0
     several = FrictionBank([GIVEN, ROOT, ROOT], engine=engine)
     before = several.to_array()

@@ -19,7 +19,7 @@ from gms_fsm.exporters.fmi.variables import FmuVariable, indicators_of, nominals
 from gms_fsm.lowering.adapting import Adapting
 from gms_fsm.run.recording.following import adapting_of
 from gms_fsm.run.stepped.failing import FAILURES
-from gms_fsm.run.stepped.memory import arguments_of
+from gms_fsm.run.stepped.memory import MOST_IN_EXPORTS, arguments_of
 from integrators.machine_code.c99 import c99_text, number_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.layout import BlockLayout, MemoryBlock
@@ -183,7 +183,7 @@ def _image(layout: BlockLayout, arguments: Any) -> str:
 def both_of(subject: Subject) -> FmuArguments:
     """Return the arguments of all entries, made of lists."""
     start, alone = subject.start, subject.alone
-    functions, machines, buffers, sample = arguments_of(start)
+    functions, machines, buffers, sample = arguments_of(start, most=MOST_IN_EXPORTS)
     size, relations = len(buffers.now.y), len(buffers.relations.watch)
     indicators = indicators_of(start, alone)
     assert len(indicators) == relations

@@ -32,9 +32,15 @@ from integrators.runners.stepping import (
 from integrators.sliding import Functions
 
 if TYPE_CHECKING:
+    from integrators.machine_code.layout import BlockLayout
     from integrators.runners.compiled import CompiledStepper as MachineCode
 
-MOST_SWITCHES = 64  # in the log of a sample; when it is full, it is emptied and the sample goes on
+# In the log of a sample; when it is full, it is emptied and the sample goes on. Each state that is
+# kept has one; exports keep none.
+MOST_SWITCHES, MOST_IN_EXPORTS = 16, 64
+# Of a block what need not be kept: numbers of the model, and what each step writes before it reads.
+FIXED = "functions.p.0", "functions.p.1"
+SCRATCH = "buffers.relations.end", "buffers.relations.search.", "buffers.scratch."
 SAMPLED, LOGGED = tuple(numbers_of(Sample)), ("t", "machine", "edge")
 PLANNED, ORIGIN = ("jumps", "before_jumps", "ticks"), ("begin", "units")
 
@@ -127,7 +133,7 @@ class ListMemory:
         """Return the present state."""
         return {name: list(place) for name, place in self.each[0].whole().items()}
 
-    room = staticmethod(dict)
+    room = copy
 
     def keep(self, room: Any) -> None:
         """Write the present state into what `room` returned."""
@@ -138,7 +144,9 @@ class ListMemory:
         self.each[0].put_whole(copy)
 
 
-def prepared(start: Problem, *, waits: bool = False) -> tuple[Buffers, Sample]:
+def prepared(
+    start: Problem, *, waits: bool = False, most: int = MOST_SWITCHES
+) -> tuple[Buffers, Sample]:
     """Return the buffers of a run without an end, and its first sample."""
     program, layout = start.program, start.program.layout
     made, size = equations(program), layout.y.size
@@ -169,9 +177,9 @@ def prepared(start: Problem, *, waits: bool = False) -> tuple[Buffers, Sample]:
         inputs=[[0.0, 0.0] for _ in lines or (None,)],
         events=[layout.y.index(name) for name in layout.events],
         seen=[0.0] * layout.observed.size,
-        t=[0.0] * MOST_SWITCHES,
-        machine=[0] * MOST_SWITCHES,
-        edge=[0] * MOST_SWITCHES,
+        t=[0.0] * most,
+        machine=[0] * most,
+        edge=[0] * most,
         before=[0.0] * size,
         middle=[0.0] * size,
         slope=[0.0] * size,
@@ -197,55 +205,37 @@ def _clocks(start: Problem) -> Clocks:
 
 # --------------------------------------------------------------------------- machine code
 class BlockMemory:
-    """Of joints that differ in numbers only: blocks one after the other, for machine code.
+    """Of one joint: a block for machine code, and what short calls need.
 
-    Calling `run` advances all; it returns not 0 if `step_to` does for one of them. In `sample`, an
-    item is a number if there is one joint, else one number per joint.
+    Calling `run` advances it; see `step_to`.
     """
 
     def __init__(self, starts: Sequence[Problem], *, waits: bool = False) -> None:
-        from integrators.machine_code.layout import MemoryBlock
         from integrators.runners.compiled import ShortArguments
 
-        code, count = machine_code(starts[0], waits=waits), len(starts)
-        alone = count == 1
-        layout, size = code.short if alone else code.layout, code.layout.words
-        words: Any = np.zeros((count, layout.words), dtype=np.int64)
-        each = []
-        for start, row in zip(starts, words, strict=True):
-            arguments: Any = arguments_of(start, waits=waits)
-            if alone:
-                arguments = ShortArguments(*arguments, short_call(size, LATEST))
-            block = MemoryBlock(layout, arguments, words=row)
-            made = block.contents
-            block.update(made)  # numbers; there are no columns
-            run = functools.partial(code.one, block.address)
-            each.append(JointMemory(made.buffers, made.functions.p[2], made.sample, run))
-        self.each, self.run, self.short = each, each[0].run, no_short_calls()
-        self.sample: Any = each[0].sample
-        if alone:
-            # A memoryview is read, written and copied in half the time of an array.
-            self._state: Any = memoryview(words[0, :size]).cast("B")
-            self.copy = self._state.tobytes
-            self.lines = [*map(memoryview, self.sample.inputs)]
-            first = layout.offset("short.v0")
-            self.short = ShortCalls(
-                memoryview(words[0, first : first + 3].view(float)),
-                functools.partial(code.advance, block.address),
-                functools.partial(code.peek, block.address),
-                made.short,
-                tuple(memoryview(each).cast("B") for each in (made.short.even, made.short.odd)),
-            )
-        else:
-            self._state, self.copy = words, words.copy
-            self.lines = [_across(words, line) for line in self.sample.inputs]
-            self.sample = SamplesAcross(words, layout.offset)
-            self.run = functools.partial(code.each, words.ctypes.data, count)
+        (start,) = starts
+        code = machine_code(start, waits=waits)
+        size, layout = code.layout.words, code.short
+        words: Any = np.zeros(layout.words, dtype=np.int64)
+        arguments: Any = (*arguments_of(start, waits=waits), short_call(size, LATEST))
+        address, made, joint = _joint(code, layout, ShortArguments._make(arguments), words)
+        self.each, self.run, self.sample = (joint,), joint.run, joint.sample
+        lines: Any = self.sample.inputs
+        # A memoryview is read, written and copied in half the time of an array.
+        self._state = memoryview(words[:size]).cast("B")
+        self.copy, self.lines = self._state.tobytes, [memoryview(line) for line in lines]
+        first, record = layout.offset("short.v0"), made.short
+        self.short = ShortCalls(
+            memoryview(words.view(np.float64)[first : first + 3]),
+            functools.partial(code.advance, address),
+            functools.partial(code.peek, address),
+            record,
+            tuple(memoryview(each).cast("B") for each in (record.even, record.odd)),
+        )
 
     def room(self) -> Any:
         """Return memory for a state, so that none need be found for each one."""
-        many = len(self.each) > 1
-        return np.empty_like(self._state) if many else memoryview(bytearray(self._state))
+        return memoryview(bytearray(self._state))
 
     def keep(self, room: Any) -> None:
         """Write the present state into what `room` returned."""
@@ -254,6 +244,68 @@ class BlockMemory:
     def take(self, copy: Any) -> None:
         """Return to what `copy` returned, or `keep` wrote."""
         self._state[:] = copy
+
+
+class BlocksMemory:
+    """Of joints that differ in numbers only: blocks one after the other, for machine code.
+
+    Calling `run` advances all; it returns not 0 if `step_to` does for one of them. In `lines` and
+    `sample`, an item is an array of one number per joint.
+    """
+
+    def __init__(self, starts: Sequence[Problem]) -> None:
+        code, count = machine_code(starts[0]), len(starts)
+        words: Any = np.zeros((count, code.layout.words), dtype=np.int64)
+        made = [
+            _joint(code, code.layout, arguments_of(start), row)
+            for start, row in zip(starts, words, strict=True)
+        ]
+        self.each, self.short = [joint for _, _, joint in made], no_short_calls()
+        self.run = functools.partial(code.each, made[0][0], count)
+        self.lines = [_across(words, line) for line in self.each[0].sample.inputs]
+        self.sample = SamplesAcross(words, code.layout.offset)
+        self._parts = [words[:, part] for part in _changing(code.layout)]
+
+    def copy(self) -> Any:
+        """Return the present state."""
+        return [part.copy() for part in self._parts]
+
+    room = copy
+
+    def keep(self, room: Any) -> None:
+        """Write the present state into what `room` returned."""
+        for kept, part in zip(room, self._parts, strict=True):
+            kept[...] = part
+
+    def take(self, copy: Any) -> None:
+        """Return to what `copy` returned, or `keep` wrote."""
+        for kept, part in zip(copy, self._parts, strict=True):
+            part[...] = kept
+
+
+def _joint(
+    code: MachineCode, layout: BlockLayout, arguments: Any, words: Any
+) -> tuple[int, Any, JointMemory]:
+    """Return the address of a block, its contents, and these as those of a joint."""
+    from integrators.machine_code.layout import MemoryBlock
+
+    block = MemoryBlock(layout, arguments, words=words)
+    made = block.contents
+    block.update(made)  # numbers; there are no columns
+    run = functools.partial(code.one, block.address)
+    return block.address, made, JointMemory(made.buffers, made.functions.p[2], made.sample, run)
+
+
+def _changing(layout: BlockLayout) -> list[slice]:
+    """Return the words of a block that are to be kept."""
+    places = sorted((first, name) for name, first in layout.offsets.items())
+    stops = [*(first for first, _ in places[1:]), layout.words]
+    found: list[slice] = []
+    for (first, name), stop in zip(places, stops, strict=True):
+        if not name.startswith((*FIXED, *SCRATCH)):
+            joined = bool(found) and found[-1].stop == first
+            found.append(slice(found.pop().start if joined else first, stop))
+    return found
 
 
 class SamplesAcross:
@@ -301,7 +353,7 @@ def machine_code(start: Problem, *, waits: bool = False) -> MachineCode:
     return made
 
 
-def arguments_of(start: Problem, *, waits: bool = False) -> Any:
+def arguments_of(start: Problem, *, waits: bool = False, most: int = MOST_SWITCHES) -> Any:
     """Return the arguments of `integrators.runners.stepping.step_to`, made of lists."""
     from integrators.runners.compiled import StepArguments
 
@@ -310,5 +362,5 @@ def arguments_of(start: Problem, *, waits: bool = False) -> Any:
     return StepArguments(
         Functions(made["flow"], made["arm"], made["margins"], made["normal"], made["follow"], p),
         machines_of(made),
-        *prepared(start, waits=waits),
+        *prepared(start, waits=waits, most=most),
     )
