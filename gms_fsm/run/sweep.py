@@ -163,7 +163,8 @@ def sweep(
         )
     collected = Collected(what, runs, begin.counted, begin.settings.t_eval)
     quick = executor is None and begin.settings.engine == "compiled"
-    chunks = _chunks(runs, (os.cpu_count() or 1) if quick else WORKERS)
+    known = os.cpu_count() if quick else getattr(executor, "_max_workers", WORKERS)
+    chunks = _chunks(runs, known or 1)
     # Dask treats tasks with equal arguments as one, and returns an earlier failure as their result.
     name = uuid.uuid4().hex
     with contextlib.ExitStack() as stack:
@@ -336,11 +337,13 @@ def _run_chunk(
     """Run some sets of parameters, one after the other, for one sweep."""
     tables = None if begin.counted is None else CountTables.empty(begin.counted)
     many = _many(what, begin, part, sweep_name, tables)
-    runs = len(next(iter(part.values())))
-    left = range(runs) if many is None else np.setdiff1d(range(runs), many.which).tolist()
-    if many is not None and tables is not None and left:  # those that failed have been counted
-        tables, many, left = CountTables.empty(tables.counting), None, range(runs)
-    return RunResults(_each(what, begin, part, left, tables), tables, many)
+    left = np.full(len(next(iter(part.values()))), True)
+    if many is not None:
+        left[many.which] = False
+        if tables is not None and left.any():  # those that failed have been counted
+            tables, many, left[:] = CountTables.empty(tables.counting), None, True
+    rows = np.flatnonzero(left).tolist()
+    return RunResults(_each(what, begin, part, rows, tables) if rows else {}, tables, many)
 
 
 def _each(
@@ -396,13 +399,13 @@ def _many(
     tables: CountTables | None,
 ) -> ManyRuns | None:
     """Make the runs whose numbers need no look, all in machine code; None if there are none."""
-    if signals_of(what).keys() & part.keys():
-        return None
     if getattr(_of_thread, "sweep_name", "") != sweep_name:
-        start = begin.start(what)
-        driven = any(body.driven and what.named for body in what.system.bodies)
-        repeatable = start.output == "end" and start.chosen.engine == "compiled" and not driven
-        runs = RepeatedRuns(start) if repeatable else None
+        runs = None
+        if not signals_of(what).keys() & part.keys():
+            start = begin.start(what)
+            driven = any(body.driven and what.named for body in what.system.bodies)
+            repeatable = start.output == "end" and start.chosen.engine == "compiled" and not driven
+            runs = RepeatedRuns(start) if repeatable else None
         _of_thread.sweep_name, _of_thread.runs, _of_thread.run = sweep_name, runs, None
     cells = None if _of_thread.runs is None else _of_thread.runs.cells(part)
     if cells is None or not cells.certain.any():

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gms_fsm.charts.parameters import Bound, bounds_of
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.gradients.directions import Directions
-from gms_fsm.language import Value, names_in
+from gms_fsm.language import Name, Value, names_in
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.repeated.block import Place, RepeatedRun
 from gms_fsm.systems import rigs
@@ -27,6 +27,7 @@ from gms_fsm.systems.signals import Function
 from gms_fsm.systems.springs import field_of
 
 MOST_SPARE = 4  # runs that wait to be repeated
+POSITIVE = bounds_of("> 0")
 EXACT = 2**53  # whole numbers that are floats
 
 
@@ -224,12 +225,13 @@ def known_numbers(start: Problem) -> dict[str, KnownNumber]:
         label = label_in(what, name)
         # An exponent of 2 is another program.
         if label in places and label not in careful and not label.endswith(f"{CURVE}delta"):
+            mass = POSITIVE if Name(label) in inertias else ()
             found[name] = KnownNumber(
                 places[label],
                 n,
-                tuple(u for u in bounds_of(parameter.rule) if not isinstance(u.limit, str)),
+                (*(u for u in bounds_of(parameter.rule) if not isinstance(u.limit, str)), *mass),
                 [],
-                tuple(tree for tree in inertias if label in names_in(tree)),
+                tuple(u for u in inertias if label in names_in(u) and u != Name(label)),
                 nonzero=label in system.numbers,
             )
     for name, (parameter, _) in names.items():

@@ -78,10 +78,9 @@ class FiredEdges:
         first = self.first
         if first is None:
             first = self.last.copy()
-            runs = np.ravel_multi_index((self.run, self.element), first.shape)
-            places, firing = np.unique(runs, return_index=True)
             sources = np.array([numbers[edge.source] for edge in chart.transitions], dtype=np.int64)
-            first.flat[places] = sources[self.edge[firing]]
+            # Of several values for one place the last one stays: that of the first firing.
+            first[self.run[::-1], self.element[::-1]] = sources[self.edge[::-1]]
         found = _per_element(first[(first >= 0).all(axis=1)].T, len(numbers))
         for edge, times in zip(chart.transitions, self.taken(chart), strict=True):
             found[numbers[edge.target]] += times
