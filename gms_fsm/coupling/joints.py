@@ -16,7 +16,7 @@ from gms_fsm.coupling.steppable import start_of
 from gms_fsm.errors import GMSError, ParameterError
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.run.problem import LATEST
-from gms_fsm.run.stepped.going_back import Alone, Snapshot, content_of
+from gms_fsm.run.stepped.going_back import Alone, Snapshot, content_of, in_use
 from gms_fsm.run.stepped.memory import (
     BlockMemory,
     BlocksMemory,
@@ -43,11 +43,10 @@ class JointGroup:
         self, joints: Sequence[Joint], memory: BlockMemory | BlocksMemory | ListMemory, places: Any
     ) -> None:
         self.joints, self.places, self.short = joints, places, memory.short
-        self.copy, self.take = memory.copy, memory.take
-        self.room, self.keep = memory.room, memory.keep
+        self.copy, self.take, self.free = memory.copy, memory.take, memory.free
         self._run, self._sample = memory.run, memory.sample
         lines: Sequence[Any] = memory.lines
-        self._v, *others = lines
+        self.v, *others = lines
         self._others = [*zip(joints[0].inputs, others, strict=False)]
         self._entering = joints[0].enters
 
@@ -68,7 +67,7 @@ class JointGroup:
                 line[0], line[1] = inputs[name]
         if self._entering:
             self._enter(t, {**inputs, "v": (v0, v1)})
-        v, sample = self._v, self._sample
+        v, sample = self.v, self._sample
         sample.end, v[0], v[1] = t, v0, v1
         if mean:
             sample.mean = True
@@ -113,19 +112,15 @@ class JointGroups:
         """Return the present state."""
         return [group.copy() for group in self.groups]
 
-    def room(self) -> Any:
-        """Return memory for a state."""
-        return [group.room() for group in self.groups]
-
-    def keep(self, room: Any) -> None:
-        """Write the present state into what `room` returned."""
-        for group, each in zip(self.groups, room, strict=True):
-            group.keep(each)
-
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned, or `keep` wrote."""
+        """Return to what `copy` returned."""
         for group, each in zip(self.groups, copy, strict=True):
             group.take(each)
+
+    def free(self, copy: Any) -> None:
+        """Let the memory of a copy serve again."""
+        for group, each in zip(self.groups, copy, strict=True):
+            group.free(each)
 
 
 def _lines_of(lines: Mapping[str, Line], places: Any) -> dict[str, Line]:
@@ -170,57 +165,67 @@ class Joints:
             mine = [joints[i] for i in places]
             groups.append(JointGroup(mine, memory, places if len(places) > 1 else places[0]))
         self.each = [joints[i] for i in range(len(given))]
+        self._first: Any = self.each[0].memory.sample
+        self._v = groups[0].v
         self.inputs = tuple(sorted({name for joint in self.each for name in joint.inputs}))
         together: JointGroup | JointGroups = JointGroups(groups)
         if len(groups) == 1 and several == (len(given) > 1):  # all values as they come
             together = groups[0]
-        self._step, self._copy = together.step, together.copy
-        self._room, self._keep, self._take = together.room, together.keep, together.take
-        self._spare = self._room()
+        self._step = together.step
+        self._copy, self._take, self._free = together.copy, together.take, together.free
         self._several = several
         self.short = groups[0].short if groups[0] is together else no_short_calls()
+        self.alone = Alone()
         if self.inputs or self.each[0].enters or not ONE_AT_A_TIME:
-            self.short.record.busy = 1
-        self.alone = Alone(self.short.record)
+            self.alone.inside = 1  # no short calls
         self._found: LastSample | None = None  # unless the last call was a short one
 
     # ------------------------------------------------------------------ samples
     @property
     def t(self) -> float:
         """The present time."""
-        end: float = self.each[0].memory.sample.end
+        end: float = self._first.end
         return end
 
     def advance(
         self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Line], t: Any = None
     ) -> Any:
         """Advance by a sample, or (dt is NaN) to t; if that fails everything is as before."""
-        with self.alone:
-            now, before, found, short = self.t, self._spare, self._found, self.short.record.last
-            end = end_of(now, dt) if dt == dt else end_at(now, t)
+        alone = self.alone
+        if not alone.acquire(False):  # as `with alone`, in half of the time
+            raise in_use()
+        alone.inside += 1
+        try:
+            now = self._first.end
+            end = now + dt
+            if not now < end < LATEST:
+                end = end_of(now, dt) if dt == dt else end_at(now, t)
+            before, found = self._copy(), self._found
             lost: Lost = {}
-            self._keep(before)
             try:
                 force = self._step(v0, v1, end, inputs, lost, now)
-                self._found = now, v0, v1, inputs, lost, before
-                self.short.record.last = False
-                self._spare = self._room() if found is None else found[5]
             except BaseException:  # Ctrl-C, too
                 self._take(before)
-                self._found, self.short.record.last = found, short
                 raise
+            self._found, self.short.record.last = (now, v0, v1, inputs, lost, before), False
+            if found is not None:
+                self._free(found[5])
             return force
+        finally:
+            alone.inside -= 1
+            alone.leave()
 
     def peek(self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Line]) -> Any:
         """Return the forces at the end of a sample, and stay."""
         with self.alone:
-            now, before = self.t, self._spare
+            now = self._first.end
             end = _in_reach(now + dt)
-            self._keep(before)
+            before = self._copy()
             try:
                 return self._step(v0, v1, end, inputs, {}, now)
             finally:
                 self._take(before)
+                self._free(before)
 
     def send(self, event: str) -> None:
         """Let an event wait for the next sample of all joints that wait for it."""
@@ -236,18 +241,18 @@ class Joints:
     @property
     def switches(self) -> list[tuple[ElementSwitch, ...]]:
         """Of each joint the edges taken in the last sample."""
-        last = self._last()
-        lost: Lost = {} if last is None else last[4]
+        recent = None if self.short.record.last else self._found
+        lost: Lost = {} if recent is None else recent[4]
         return [(*lost.get(joint, ()), *joint.logged) for joint in self.each]
 
     @property
     def mean_force(self) -> Any:
         """The mean of the force over the last sample."""
         with self.alone:
-            begin, _, v1, *_ = self._sample()
-            if begin == self.t:
+            (begin, _, v1, *_), end = self._sample(), self.t
+            if begin == end:
                 return self._again(v1)
-            return self._again(v1, mean=True) / (self.t - begin)
+            return self._again(v1, mean=True) / (end - begin)
 
     @property
     def dF_dv(self) -> Any:
@@ -264,25 +269,20 @@ class Joints:
         speeds = [joint.speed for joint in self.each]
         return np.array(speeds) if self._several else speeds[0]
 
-    def _last(self) -> LastSample | None:
-        """Return the last sample, if there is one."""
-        _, _, _, record, kept = self.short
-        if record.last:
-            v0, v1 = map(float, self.each[0].memory.sample.inputs[0])
-            return record.begin, v0, v1, {}, {}, kept[record.row]
-        return self._found
-
     def _sample(self) -> LastSample:
-        last = self._last()
-        if last is None:
+        """Return the last sample."""
+        record, v = self.short.record, self._v
+        if record.last:
+            before = self.short.kept[record.row]
+            self._found, record.last = (record.begin, v[0], v[1], {}, {}, before), False
+        if self._found is None:
             raise ParameterError("there is no last sample", advice="call advance first")
-        return last
+        return self._found
 
     def _again(self, v1: Any, *, mean: bool = False) -> Any:
         """Return the force, or its integral, had the last velocity been v1."""
         _, v0, _, inputs, _, before = self._sample()
-        end, now = self.t, self._spare
-        self._keep(now)
+        end, now = self.t, self._copy()
         try:
             self._take(before)
             return self._step(v0, v1, end, inputs, {}, end, mean=mean)

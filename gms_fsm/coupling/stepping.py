@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -69,6 +69,7 @@ class FrictionState:
         asked = Asked(t, initial, rtol)
         self._joints = Joints([model_or_contact], [asked], engine, several=False)
         (self._joint,) = self._joints.each
+        self._alone = self._joints.alone
         self._given, self._advance, self._peek, *_ = self._joints.short
 
     def __repr__(self) -> str:
@@ -111,8 +112,9 @@ class FrictionState:
         SimulationError
             If it cannot continue. In both cases the friction is as it was before.
         """
-        # Machine code does all that is usual: no other thread comes between what is given and it.
-        if not inputs and isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float):
+        usual = isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float)
+        # From here to the end of the call of machine code no other thread can come between.
+        if usual and not inputs and not self._alone.inside:
             given = self._given
             given[0], given[1], given[2] = v0, v1, dt
             force = self._advance()
@@ -142,9 +144,16 @@ class FrictionState:
         ParameterError, SimulationError
             As in `advance`, or if t is before the present time.
         """
+        usual = isinstance(v0, float) and isinstance(v1, float) and isinstance(t, float)
+        if usual and not inputs and not self._alone.inside:
+            given = self._given
+            given[0], given[1], given[2], given[3] = v0, v1, nan, t
+            force = self._advance()
+            if force < inf:
+                return force
         v0, v1, _ = _checked(v0, v1, 0.0)
-        force: float = self._joints.advance(v0, v1, nan, self._lines(inputs), t)
-        return force
+        found: float = self._joints.advance(v0, v1, nan, self._lines(inputs), t)
+        return found
 
     def peek(self, v0: float, v1: float, dt: float, **inputs: Line) -> float:
         """Return what `advance` would return, and stay: for the stages of a Runge-Kutta step.
@@ -164,7 +173,8 @@ class FrictionState:
         ParameterError, SimulationError
             As in `advance`.
         """
-        if not inputs and isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float):
+        usual = isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float)
+        if usual and not inputs and not self._alone.inside:
             given = self._given
             given[0], given[1], given[2] = v0, v1, dt
             force = self._peek()
@@ -292,6 +302,9 @@ class FrictionState:
 
 def _checked(v0: Any, v1: Any, dt: Any) -> tuple[float, float, float]:
     """Return the arguments of a sample as floats, or refuse them."""
+    usual = isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float)
+    if usual and isfinite(v0) and isfinite(v1) and 0.0 <= dt < inf:
+        return v0, v1, dt
     return _finite("v0", v0), _finite("v1", v1), checked_scalar("dt", dt, ">= 0")
 
 

@@ -93,8 +93,8 @@ class ShortCall:
     v0: float  # the only input, at the beginning and at the end
     v1: float
     dt: float
+    t: float  # where it ends, if dt is NaN
     latest: float  # time at which a sample may end
-    busy: int  # not 0: each call needs a closer look
     begin: float  # of the last sample
     last: bool  # whether that was advanced by `advance_by`
     row: int  # 0 or 1: what holds the state before it, `even` or `odd`
@@ -104,7 +104,7 @@ class ShortCall:
 
 def short_call(words: int, latest: float = 0.0) -> ShortCall:
     """Return the beginning of short calls on a state of so many words."""
-    return ShortCall(0.0, 0.0, 0.0, latest, 0, 0.0, False, 0, [0] * words, [0] * words)
+    return ShortCall(0.0, 0.0, 0.0, 0.0, latest, 0.0, False, 0, [0] * words, [0] * words)
 
 
 def advance_by(
@@ -116,6 +116,8 @@ def advance_by(
     The words are all that a sample changes.
     """
     begin, end = sample.end, sample.end + short.dt
+    if short.dt != short.dt:
+        end = short.t
     if not (begin < end and _is_plain(short, end)):
         return INFINITY
     keep_words(short, words)
@@ -134,7 +136,7 @@ def peek_by(
 ) -> float:  # fmt: skip
     """Return what `advance_by` would return, and stay."""
     end = sample.end + short.dt
-    if not _is_plain(short, end):
+    if not (short.dt >= 0.0 and _is_plain(short, end)):
         return INFINITY
     keep_words(short, words)
     failed = _fails(functions, machines, b, sample, short, end)
@@ -145,8 +147,7 @@ def peek_by(
 
 def _is_plain(short: ShortCall, end: float) -> bool:
     """Return whether the arguments need no closer look."""
-    finite = abs(short.v0) < INFINITY and abs(short.v1) < INFINITY
-    return short.busy == 0 and finite and short.dt >= 0.0 and end < short.latest
+    return abs(short.v0) < INFINITY and abs(short.v1) < INFINITY and end < short.latest
 
 
 def _fails(

@@ -8,7 +8,6 @@ from typing import Any
 
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import checked_kind
-from integrators.runners.stepping import ShortCall
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,23 +28,21 @@ class Snapshot:
 class Alone:
     """Lets one thread at a time into a friction, and refuses the others at once.
 
-    The same thread may come in again: after Ctrl-C it may never have left. Short calls, which no
-    thread interrupts, are refused while one is in.
+    The same thread may come in again: after Ctrl-C it may never have left. While one is `inside`,
+    there are no short calls.
     """
 
-    def __init__(self, short: ShortCall | None = None) -> None:
+    def __init__(self) -> None:
         lock = threading.RLock()
-        self.acquire, self.leave, self._short = lock.acquire, lock.release, short
+        self.acquire, self.leave, self.inside = lock.acquire, lock.release, 0
 
     def __enter__(self) -> None:
         if not self.acquire(False):
             raise in_use()
-        if self._short is not None:
-            self._short.busy += 1
+        self.inside += 1
 
     def __exit__(self, *_: object) -> None:
-        if self._short is not None:
-            self._short.busy -= 1
+        self.inside -= 1
         self.leave()
 
 

@@ -94,7 +94,7 @@ class JointMemory(NamedTuple):
 class ShortCalls(NamedTuple):
     """Calls for one joint with one input, which return the force; see `advance_by`."""
 
-    given: Any  # v0, v1 and dt
+    given: Any  # v0, v1, dt and t
     advance: Callable[[], float]
     peek: Callable[[], float]
     record: ShortCall
@@ -103,7 +103,7 @@ class ShortCalls(NamedTuple):
 
 def no_short_calls() -> ShortCalls:
     """Return calls of which each needs a closer look."""
-    return ShortCalls([0.0] * 3, lambda: math.inf, lambda: math.inf, short_call(0))
+    return ShortCalls([0.0] * 4, lambda: math.inf, lambda: math.inf, short_call(0))
 
 
 def fast() -> bool:
@@ -133,15 +133,12 @@ class ListMemory:
         """Return the present state."""
         return {name: list(place) for name, place in self.each[0].whole().items()}
 
-    room = copy
-
-    def keep(self, room: Any) -> None:
-        """Write the present state into what `room` returned."""
-        room.update(self.copy())
-
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned, or `keep` wrote."""
+        """Return to what `copy` returned."""
         self.each[0].put_whole(copy)
+
+    def free(self, copy: Any) -> None:
+        """Let the memory of a copy serve again: here it need not."""
 
 
 def prepared(
@@ -226,24 +223,19 @@ class BlockMemory:
         self.copy, self.lines = self._state.tobytes, [memoryview(line) for line in lines]
         first, record = layout.offset("short.v0"), made.short
         self.short = ShortCalls(
-            memoryview(words.view(np.float64)[first : first + 3]),
+            memoryview(words.view(np.float64)[first : first + 4]),
             functools.partial(code.advance, address),
             functools.partial(code.peek, address),
             record,
             tuple(memoryview(each).cast("B") for each in (record.even, record.odd)),
         )
 
-    def room(self) -> Any:
-        """Return memory for a state, so that none need be found for each one."""
-        return memoryview(bytearray(self._state))
-
-    def keep(self, room: Any) -> None:
-        """Write the present state into what `room` returned."""
-        room[:] = self._state
-
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned, or `keep` wrote."""
+        """Return to what `copy` returned."""
         self._state[:] = copy
+
+    def free(self, copy: Any) -> None:
+        """Let the memory of a copy serve again: here it need not."""
 
 
 class BlocksMemory:
@@ -265,22 +257,23 @@ class BlocksMemory:
         self.lines = [_across(words, line) for line in self.each[0].sample.inputs]
         self.sample = SamplesAcross(words, code.layout.offset)
         self._parts = [words[:, part] for part in _changing(code.layout)]
+        self._rooms = list[list[Any]]()
 
     def copy(self) -> Any:
-        """Return the present state."""
-        return [part.copy() for part in self._parts]
-
-    room = copy
-
-    def keep(self, room: Any) -> None:
-        """Write the present state into what `room` returned."""
-        for kept, part in zip(room, self._parts, strict=True):
-            kept[...] = part
+        """Return the present state, in memory that is free if there is some."""
+        made = self._rooms.pop() if self._rooms else [*map(np.empty_like, self._parts)]
+        for room, part in zip(made, self._parts, strict=True):
+            room[...] = part
+        return made
 
     def take(self, copy: Any) -> None:
-        """Return to what `copy` returned, or `keep` wrote."""
-        for kept, part in zip(copy, self._parts, strict=True):
-            part[...] = kept
+        """Return to what `copy` returned."""
+        for room, part in zip(copy, self._parts, strict=True):
+            part[...] = room
+
+    def free(self, copy: Any) -> None:
+        """Let the memory of a copy serve again: to find so much takes longer than to copy."""
+        self._rooms.append(copy)
 
 
 def _joint(
