@@ -109,8 +109,8 @@ class EntryPoint(NamedTuple):
         Integers that are passed besides the block, by name, and those that are known.
     vectors : bool
         Whether it computes numbers side by side.
-    words : int
-        If not 0, so many words at the beginning of the block are its last argument, too.
+    words : tuple of int
+        So many words at the beginning of the block are a further argument.
     """
 
     name: str
@@ -118,7 +118,7 @@ class EntryPoint(NamedTuple):
     parts: str = ""
     extra: tuple[str | int, ...] = ()
     vectors: bool = False
-    words: int = 0
+    words: tuple[int, ...] = ()
 
 
 RECORD = "functions machines buffers log recorded tally"
@@ -497,8 +497,8 @@ def stepper(
     short = BlockLayout(whole, is_known)
     entries = [
         EntryPoint("entry", stepping.step_to, STEP),
-        EntryPoint("advance_by", stepping.advance_by, f"{STEP} short", words=layout.words),
-        EntryPoint("peek_by", stepping.peek_by, f"{STEP} short", words=layout.words),
+        EntryPoint("advance_by", stepping.advance_by, f"{STEP} short", words=(layout.words,)),
+        EntryPoint("peek_by", stepping.peek_by, f"{STEP} short", words=(layout.words,)),
     ]
     name = _name(text, whole, short, entries)
     library = Library(_object(name, short, entries, store, notify, each=layout.words))

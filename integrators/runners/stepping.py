@@ -40,6 +40,9 @@ from integrators.steps import ArcMotion, Vector
 from integrators.switching.sliding_bounds import let_go, look_back
 
 FULL_LOG = 21  # the log is full: empty it, and call again
+# What a short call is given: the only input at the beginning and the end of a sample, how long that
+# is, and where it ends if its length is NaN.
+FIRST, LAST, LENGTH, END = range(4)
 EXACT = 2.0**53  # up to here every whole number is a float
 
 
@@ -90,21 +93,18 @@ class Sample:
 class ShortCall:
     """What `advance_by` and `peek_by` are given, and what they keep."""
 
-    v0: float  # the only input, at the beginning and at the end
-    v1: float
-    dt: float
-    t: float  # where it ends, if dt is NaN
     latest: float  # time at which a sample may end
     begin: float  # of the last sample
     last: bool  # whether that was advanced by `advance_by`
     row: int  # 0 or 1: what holds the state before it, `even` or `odd`
+    given: Vector  # see FIRST, LAST, LENGTH, END
     even: list[int]
     odd: list[int]
 
 
 def short_call(words: int, latest: float = 0.0) -> ShortCall:
     """Return the beginning of short calls on a state of so many words."""
-    return ShortCall(0.0, 0.0, 0.0, 0.0, latest, 0.0, False, 0, [0] * words, [0] * words)
+    return ShortCall(latest, 0.0, False, 0, [0.0] * 4, [0] * words, [0] * words)
 
 
 def advance_by(
@@ -115,9 +115,9 @@ def advance_by(
 
     The words are all that a sample changes.
     """
-    begin, end = sample.end, sample.end + short.dt
-    if short.dt != short.dt:
-        end = short.t
+    begin, end, length = sample.end, short.given[END], short.given[LENGTH]
+    if length == length:
+        end = begin + length
     if not (begin < end and _is_plain(short, end)):
         return INFINITY
     keep_words(short, words)
@@ -135,8 +135,8 @@ def peek_by(
     words: list[int],
 ) -> float:  # fmt: skip
     """Return what `advance_by` would return, and stay."""
-    end = sample.end + short.dt
-    if not (short.dt >= 0.0 and _is_plain(short, end)):
+    end = sample.end + short.given[LENGTH]
+    if not (short.given[LENGTH] >= 0.0 and _is_plain(short, end)):
         return INFINITY
     keep_words(short, words)
     failed = _fails(functions, machines, b, sample, short, end)
@@ -147,7 +147,8 @@ def peek_by(
 
 def _is_plain(short: ShortCall, end: float) -> bool:
     """Return whether the arguments need no closer look."""
-    return abs(short.v0) < INFINITY and abs(short.v1) < INFINITY and end < short.latest
+    first, last = abs(short.given[FIRST]), abs(short.given[LAST])
+    return first < INFINITY and last < INFINITY and end < short.latest
 
 
 def _fails(
@@ -156,8 +157,8 @@ def _fails(
 ) -> bool:  # fmt: skip
     """Advance to a time; return whether that fails, or takes further calls."""
     sample.end = end
-    sample.inputs[0][0] = short.v0
-    sample.inputs[0][1] = short.v1
+    sample.inputs[0][0] = short.given[FIRST]
+    sample.inputs[0][1] = short.given[LAST]
     return step_to(functions, machines, b, sample) != 0 or not abs(sample.force) < INFINITY
 
 

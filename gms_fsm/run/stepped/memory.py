@@ -94,7 +94,7 @@ class JointMemory(NamedTuple):
 class ShortCalls(NamedTuple):
     """Calls for one joint with one input, which return the force; see `advance_by`."""
 
-    given: Any  # v0, v1, dt and t
+    given: Any  # v0, v1, dt and t: see there
     advance: Callable[[], float]
     peek: Callable[[], float]
     record: ShortCall
@@ -212,23 +212,28 @@ class BlockMemory:
 
         (start,) = starts
         code = machine_code(start, waits=waits)
-        size, layout = code.layout.words, code.short
+        size, arguments = code.layout.words, arguments_of(start, waits=waits)
+        layout = code.layout
+        if not waits:
+            layout = code.short
+            arguments = ShortArguments._make((*arguments, short_call(size, LATEST)))
         words: Any = np.zeros(layout.words, dtype=np.int64)
-        arguments: Any = (*arguments_of(start, waits=waits), short_call(size, LATEST))
-        address, made, joint = _joint(code, layout, ShortArguments._make(arguments), words)
+        address, made, joint = _joint(code, layout, arguments, words)
         self.each, self.run, self.sample = (joint,), joint.run, joint.sample
         lines: Any = self.sample.inputs
         # A memoryview is read, written and copied in half the time of an array.
         self._state = memoryview(words[:size]).cast("B")
         self.copy, self.lines = self._state.tobytes, [memoryview(line) for line in lines]
-        first, record = layout.offset("short.v0"), made.short
-        self.short = ShortCalls(
-            memoryview(words.view(np.float64)[first : first + 4]),
-            functools.partial(code.advance, address),
-            functools.partial(code.peek, address),
-            record,
-            tuple(memoryview(each).cast("B") for each in (record.even, record.odd)),
-        )
+        self.short = no_short_calls()
+        if not waits:
+            record = made.short
+            self.short = ShortCalls(
+                memoryview(record.given),
+                functools.partial(code.advance, address),
+                functools.partial(code.peek, address),
+                record,
+                tuple(memoryview(each).cast("B") for each in (record.even, record.odd)),
+            )
 
     def take(self, copy: Any) -> None:
         """Return to what `copy` returned."""
