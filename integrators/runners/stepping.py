@@ -40,9 +40,6 @@ from integrators.steps import ArcMotion, Vector
 from integrators.switching.sliding_bounds import let_go, look_back
 
 FULL_LOG = 21  # the log is full: empty it, and call again
-# What a short call is given: the only input at the beginning and the end of a sample, how long that
-# is, and where it ends if its length is NaN.
-FIRST, LAST, LENGTH, END = range(4)
 EXACT = 2.0**53  # up to here every whole number is a float
 
 
@@ -90,6 +87,16 @@ class Sample:
 
 
 @dataclass(slots=True, eq=False)
+class ShortSample:
+    """A sample of which there is one input."""
+
+    v0: float
+    v1: float
+    dt: float
+    t: float  # where it ends, if dt is NaN
+
+
+@dataclass(slots=True, eq=False)
 class ShortCall:
     """What `advance_by` and `peek_by` are given, and what they keep."""
 
@@ -97,14 +104,15 @@ class ShortCall:
     begin: float  # of the last sample
     last: bool  # whether that was advanced by `advance_by`
     row: int  # 0 or 1: what holds the state before it, `even` or `odd`
-    given: Vector  # see FIRST, LAST, LENGTH, END
+    given: ShortSample
     even: list[int]
     odd: list[int]
 
 
 def short_call(words: int, latest: float = 0.0) -> ShortCall:
     """Return the beginning of short calls on a state of so many words."""
-    return ShortCall(latest, 0.0, False, 0, [0.0] * 4, [0] * words, [0] * words)
+    given = ShortSample(0.0, 0.0, 0.0, 0.0)
+    return ShortCall(latest, 0.0, False, 0, given, [0] * words, [0] * words)
 
 
 def advance_by(
@@ -115,9 +123,8 @@ def advance_by(
 
     The words are all that a sample changes.
     """
-    begin, end, length = sample.end, short.given[END], short.given[LENGTH]
-    if length == length:
-        end = begin + length
+    begin, given = sample.end, short.given
+    end = given.t if given.dt != given.dt else begin + given.dt
     if not (begin < end and _is_plain(short, end)):
         return INFINITY
     keep_words(short, words)
@@ -135,8 +142,8 @@ def peek_by(
     words: list[int],
 ) -> float:  # fmt: skip
     """Return what `advance_by` would return, and stay."""
-    end = sample.end + short.given[LENGTH]
-    if not (short.given[LENGTH] >= 0.0 and _is_plain(short, end)):
+    end = sample.end + short.given.dt
+    if not (short.given.dt >= 0.0 and _is_plain(short, end)):
         return INFINITY
     keep_words(short, words)
     failed = _fails(functions, machines, b, sample, short, end)
@@ -147,8 +154,8 @@ def peek_by(
 
 def _is_plain(short: ShortCall, end: float) -> bool:
     """Return whether the arguments need no closer look."""
-    first, last = abs(short.given[FIRST]), abs(short.given[LAST])
-    return first < INFINITY and last < INFINITY and end < short.latest
+    finite = abs(short.given.v0) < INFINITY and abs(short.given.v1) < INFINITY
+    return finite and end < short.latest
 
 
 def _fails(
@@ -157,8 +164,8 @@ def _fails(
 ) -> bool:  # fmt: skip
     """Advance to a time; return whether that fails, or takes further calls."""
     sample.end = end
-    sample.inputs[0][0] = short.given[FIRST]
-    sample.inputs[0][1] = short.given[LAST]
+    sample.inputs[0][0] = short.given.v0
+    sample.inputs[0][1] = short.given.v1
     return step_to(functions, machines, b, sample) != 0 or not abs(sample.force) < INFINITY
 
 

@@ -94,7 +94,7 @@ class JointMemory(NamedTuple):
 class ShortCalls(NamedTuple):
     """Calls for one joint with one input, which return the force; see `advance_by`."""
 
-    given: Any  # v0, v1, dt and t: see there
+    given: Any  # the numbers of a `ShortSample`
     advance: Callable[[], float]
     peek: Callable[[], float]
     record: ShortCall
@@ -226,9 +226,9 @@ class BlockMemory:
         self.copy, self.lines = self._state.tobytes, [memoryview(line) for line in lines]
         self.short = no_short_calls()
         if not waits:
-            record = made.short
+            record, given = made.short, np.frombuffer(made.short.given)
             self.short = ShortCalls(
-                memoryview(record.given),
+                memoryview(given),  # type: ignore[arg-type]
                 functools.partial(code.advance, address),
                 functools.partial(code.peek, address),
                 record,
