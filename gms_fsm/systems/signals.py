@@ -243,7 +243,8 @@ def as_signal(given: SignalLike) -> Signal:
 def first_after(t: float, times: Sequence[float]) -> int:
     """Return the number of the first corner after t; how many there are if none is.
 
-    Corners that are evenly spaced, as in most records, are found at once.
+    Corners that are evenly spaced, as in most records, are found at once; to look at a few takes
+    less time than to divide.
 
     Examples
     --------
@@ -252,7 +253,7 @@ def first_after(t: float, times: Sequence[float]) -> int:
     """
     low, high = 0, len(times)
     since, whole = t - times[0], times[high - 1] - times[0]
-    if since >= 0.0 and since < whole:
+    if high > 4 and since >= 0.0 and since < whole:
         near = int(since / whole * (high - 1))
         if times[near] <= t:
             low = near + 1
