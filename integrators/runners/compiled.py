@@ -367,11 +367,7 @@ def translated(layout: BlockLayout, entries: Sequence[EntryPoint], *, each: int 
                     NumberValue(Local("i", extra) if isinstance(extra, str) else Const("i", extra))
                     for extra in entry.extra
                 ),
-                *(
-                    [ArrayValue("i", (Const("i", n),), Local("p", "block"))]
-                    if (n := entry.words)
-                    else []
-                ),
+                *(ArrayValue("i", (Const("i", n),), Local("p", "block")) for n in entry.words),
             ],
         )
         for entry in entries
