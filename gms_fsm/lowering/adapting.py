@@ -254,7 +254,7 @@ OF_A_RUN = (
 @functools.lru_cache(maxsize=64)
 def stamp_of(plan: ProgramPlan) -> str:
     """Return a hash of what `adapt` does for a plan."""
-    from integrators.runners.compiled import digest
+    from integrators.runners.edition import digest
 
     helpers = [each for each in HELPERS.values() if isinstance(each, FunctionType)]
     constants = SHARE, LOOKS, ROUNDED, LIMIT

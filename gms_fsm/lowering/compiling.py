@@ -133,7 +133,7 @@ def with_more(engine: CompiledFunction, *, alone: bool = False) -> Library:
 
 def text_of(program: Program, more: str = "") -> str:
     """Return what machine code depends on: a program's text, more text, and what these call."""
-    from integrators.runners.compiled import digest
+    from integrators.runners.edition import digest
 
     return digest(sgn, first_after, piecewise_linear, piecewise_slope, text=program.source + more)
 

@@ -151,7 +151,7 @@ class Checkpointer:
 def _program() -> str:
     """Identify the program: another version might compute other bits or use another layout."""
     from gms_fsm._version import __version__
-    from integrators.runners.compiled import edition
+    from integrators.runners.edition import edition
 
     return f"gms-fsm {__version__} ({edition()[:8]}) on Python {platform.python_version()}"
 

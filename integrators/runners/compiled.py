@@ -8,50 +8,32 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import functools
 import gc
 import hashlib
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from types import CodeType, FunctionType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from integrators import advance, crossings, elementary, loop, sliding, step_size, steps
 from integrators.loop import Buffers, Machines
-from integrators.machine_code import layout as layouts
-from integrators.machine_code import llvm, objects, records, tree, whole_numbers
+from integrators.machine_code import objects
 from integrators.machine_code.calls import CompiledFunction
-from integrators.machine_code.front_end import (
-    bindings,
-    expressions,
-    passing,
-    sources,
-    statements,
-    translate,
-    values,
-    work,
-)
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import ArrayValue, NumberValue
 from integrators.machine_code.layout import BlockLayout, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, has_wide_vectors, target_name
 from integrators.machine_code.tree import Const, Local, OuterEntry
-from integrators.machine_code.tuning import APART, HOT, INLINE, KEEPING
-from integrators.runners import columns, observing, repeating, stepping
+from integrators.machine_code.tuning import APART, HOT, INLINE
+from integrators.runners import columns, observing, stepping
 from integrators.runners.columns import LogColumns, Recorded, RowTally, counts_nothing
+from integrators.runners.edition import edition
 from integrators.runners.stepping import Sample, ShortCall
 from integrators.sliding import Functions, Held, Sliding
 from integrators.steps import Coefficients
-from integrators.switching import jolts, sliding_bounds
-from integrators.tangents import motion
-from integrators.tangents import run as tangent_run
-from integrators.tangents import switches as tangent_switches
 
 __all__ = [
     "CodeStore",
@@ -60,8 +42,6 @@ __all__ = [
     "EntryPoint",
     "RecordArguments",
     "StepArguments",
-    "digest",
-    "edition",
     "engine",
     "example",
     "is_known",
@@ -69,11 +49,6 @@ __all__ = [
     "stepper",
 ]
 
-# What is translated: the loop, and what it calls.
-LOOPS = (
-    elementary, whole_numbers, steps, step_size, crossings, advance, sliding, sliding_bounds, jolts,
-    loop, columns, stepping, observing, repeating, motion, tangent_switches, tangent_run,
-)  # fmt: skip
 _compiling = threading.RLock()  # runs may be in several threads
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8
@@ -167,84 +142,6 @@ class CodeStore(Protocol):
 
     def put(self, name: str, content: bytes) -> None:
         """Store content under a name, if possible."""
-
-
-# --------------------------------------------------------------------------- what it depends on
-def digest(*functions: Callable[..., Any], text: str = "") -> str:
-    """Return a hash of what some functions do.
-
-    It is computed from their code as loaded, not from their files: these may have been replaced
-    under a running program, which would then store its old code under the new name.
-
-    Parameters
-    ----------
-    *functions : callable
-        Python functions.
-    text : str
-        Further text that affects the result.
-
-    Returns
-    -------
-    str
-        16 hexadecimal digits.
-    """
-    stamp = hashlib.sha256(text.encode())
-    codes = [function.__code__ for function in functions]
-    while codes:
-        code = codes.pop()
-        codes += [u for u in code.co_consts if isinstance(u, CodeType)]
-        constants = [u for u in code.co_consts if not isinstance(u, CodeType)]
-        stamp.update(repr((code.co_code, code.co_names, code.co_varnames, constants)).encode())
-    return stamp.hexdigest()[:16]
-
-
-@functools.cache
-def edition() -> str:
-    """Return a hash of what the loop computes, whatever system it runs.
-
-    Returns
-    -------
-    str
-        It changes with the loop's source, with how it is translated, and with the version of
-        Python.
-
-    Examples
-    --------
-    >>> len(edition())
-    16
-    """
-    front = (sources, work, bindings, passing, expressions, statements, translate)
-    tools = (*front, values, tree, records, layouts, llvm, objects)
-    functions: list[Callable[..., Any]] = []
-    constants: list[tuple[str, Any]] = []
-    for module in (*LOOPS, *tools):
-        for name, found in vars(module).items():
-            value = getattr(found, "__wrapped__", found)  # inside a cache
-            if isinstance(value, FunctionType) and value.__module__ == module.__name__:
-                functions.append(value)
-            elif isinstance(value, type) and value.__module__ == module.__name__:
-                members = vars(value).values()
-                functions += [each for each in members if isinstance(each, FunctionType)]
-            number = isinstance(value, int | float | str) or _is_table(value)
-            if number and not name.startswith("__"):
-                constants.append((name, value))
-            elif isinstance(value, dict) and {*map(type, value.values())} in ({str}, {bool}):
-                constants.append((name, sorted(value.values())))  # an empty one is filled later
-            else:
-                constants.append((name, getattr(value, "__match_args__", None)))
-    return digest(
-        *functions,
-        text=repr(
-            (sys.version, constants, sorted(INLINE.items()), *map(sorted, (HOT, KEEPING)), APART)
-        ),
-    )
-
-
-def _is_table(value: Any) -> bool:
-    """Return whether a value is a tuple of floats, or of such tuples."""
-    if not isinstance(value, tuple) or hasattr(value, "_fields"):
-        return isinstance(value, float)
-    return bool(value) and all(map(_is_table, value))
 
 
 # --------------------------------------------------------------------------- engines

@@ -281,7 +281,7 @@ def test_another_version_is_named(path: Path, monkeypatch: pytest.MonkeyPatch) -
         begun(path)
     with pytest.raises(CheckpointError, match=r"started by gms-fsm 0\.0\.7 .* this is gms-fsm "):
         goes_on(path)
-    monkeypatch.setattr("integrators.runners.compiled.edition", lambda: "another loop")
+    monkeypatch.setattr("integrators.runners.edition.edition", lambda: "another loop")
     with pytest.raises(CheckpointError, match="which may compute different bits"):
         goes_on(path)
     _write(
