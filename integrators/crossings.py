@@ -56,7 +56,6 @@ DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
 # Where more relations are watched, they change one soon after another. Steps are aimed at the next
 # change, and a search goes on longer by slopes alone.
 MANY = 500
-PATIENCE = 5  # probes that may fail to halve a bracket of many
 AIMED = 1.05  # of the time to the next change
 
 
@@ -375,11 +374,10 @@ def _bracket(
     """Close the bracket (low unchanged, high changed; margins in search.low, search.high)."""
     search = w.search
     tolerance = max(resolution / (path.t_new - path.t), 4e-16)
-    patience = PATIENCE if len(w.truth) > MANY else 1  # which is known while translating
-    missed = 0
+    missed, rising = 0, False
     while high - low > tolerance:
         guess = 0.5 * (low + high)
-        if missed < patience:
+        if missed < 2:
             guess = high
             for r in w.active:
                 b = search.high[r]
@@ -387,16 +385,22 @@ def _bracket(
                     a = search.low[r]
                     if a != b:
                         guess = min(guess, low + (high - low) * (a / (a - b)))
+            if missed == 1:  # lines meet zero on one side again and again; twice as far is beyond
+                guess = 2.0 * guess - (low if rising else high)
             # Half a tick inside the bracket, so that the last evaluation closes it.
             guess = min(max(guess, low + 0.5 * tolerance), high - 0.5 * tolerance)
         width = high - low
-        if _probe(path, guess, w):
-            high = guess
-            copy_margins(w, search.probe, search.high)
-        else:
+        rising = not _probe(path, guess, w)
+        if rising:
             low = guess
             copy_margins(w, search.probe, search.low)
-        missed = missed + 1 if high - low > 0.5 * width else 0
+        else:
+            high = guess
+            copy_margins(w, search.probe, search.high)
+        if missed == 2:  # halved; where slopes have misled, every other guess is theirs
+            missed = 1
+        else:
+            missed = missed + 1 if high - low > 0.5 * width else 0
     return low, high
 
 

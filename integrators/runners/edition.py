@@ -43,18 +43,6 @@ def digest(*functions: Callable[..., Any], text: str = "") -> str:
 
     It is computed from their code as loaded, not from their files: these may have been replaced
     under a running program, which would then store its old code under the new name.
-
-    Parameters
-    ----------
-    *functions : callable
-        Python functions.
-    text : str
-        Further text that affects the result.
-
-    Returns
-    -------
-    str
-        16 hexadecimal digits.
     """
     stamp = hashlib.sha256(text.encode())
     codes = [function.__code__ for function in functions]
@@ -68,19 +56,7 @@ def digest(*functions: Callable[..., Any], text: str = "") -> str:
 
 @functools.cache
 def edition() -> str:
-    """Return a hash of what the loop computes, whatever system it runs.
-
-    Returns
-    -------
-    str
-        It changes with the loop's source, with how it is translated, and with the version of
-        Python.
-
-    Examples
-    --------
-    >>> len(edition())
-    16
-    """
+    """Return a hash of what the loop computes, whatever system it runs."""
     front = (sources, work, bindings, passing, expressions, statements, translate)
     tools = (*front, values, tree, records, layouts, llvm, objects)
     functions: list[Callable[..., Any]] = []

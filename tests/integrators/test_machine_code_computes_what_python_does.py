@@ -30,7 +30,7 @@ from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.script.javascript import javascript_text, library_text
 from integrators.machine_code.tree import Const, Local
 from integrators.machine_code.tuning import INLINE
-from integrators.runners import compiled
+from integrators.runners import edition
 from integrators.step_size import retry_factor
 from tests.soak.platforms import CLibrary
 
@@ -726,7 +726,7 @@ def test_javascript_has_integers_of_truth_values_and_neighbours():
 
 def test_what_is_said_about_putting_inline_is_said_about_functions_that_exist():
     """Those of the loop are in its modules, the others in every generated program."""
-    known = {name for module in compiled.LOOPS for name in vars(module)}
+    known = {name for module in edition.LOOPS for name in vars(module)}
     program = {"arm", "flow", "flow_live", "jolts", "normal", "observe", "switch", "tick"}
     assert INLINE.keys() - (known - program) == program
 
