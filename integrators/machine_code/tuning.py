@@ -33,5 +33,5 @@ HOT = {
     "interpolate", "margins", "observe_free", "_probe", "rate_in_lanes", "_search",
     "slope_in_lanes", "switch", "take_step",
 }  # fmt: skip
-# What is called in the midst of a step saves the registers it uses: its callers use nearly all.
-KEEPING = {"exp", "margins"}
+# It is called in the midst of a step and saves the registers it uses: its callers use nearly all.
+KEEPING = {"exp"}
