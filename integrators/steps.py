@@ -209,21 +209,23 @@ def fit_dense(method: Coefficients, h: float, y: Vector, scratch: Scratch) -> No
 
 
 def weighted_sum(weights: Row, stages: int, f_new: Vector, k: list[Vector], out: Vector) -> None:
-    """Compute the weighted sum of all slopes of a step."""
-    last, a = weights[stages], weights[0]
-    first = k[0]
-    for j in range(len(out)):
-        out[j] = last * f_new[j] + a * first[j]
+    """Compute the weighted sum of all slopes of a step; the newest is known, and added, last."""
+    a, first = weights[0], k[0]
+    if stages % 2 == 1:
+        for j in range(len(out)):
+            out[j] = a * first[j]
+    else:
+        b, second = weights[stages - 1], k[stages - 1]
+        for j in range(len(out)):
+            out[j] = a * first[j] + b * second[j]
     for m in range(1, stages - 1, 2):
         a, b = weights[m], weights[m + 1]
         k_m, k_n = k[m], k[m + 1]
         for j in range(len(out)):
             out[j] = out[j] + a * k_m[j] + b * k_n[j]
-    if stages % 2 == 0:
-        a = weights[stages - 1]
-        k_m = k[stages - 1]
-        for j in range(len(out)):
-            out[j] += a * k_m[j]
+    a = weights[stages]
+    for j in range(len(out)):
+        out[j] += a * f_new[j]
 
 
 def interpolate(dense: Dense, theta: float, out: Vector) -> None:
