@@ -73,7 +73,10 @@ def test_code_prints_the_generated_program(law: str, gms_fsm: CommandLine) -> No
     assert done.startswith(head)
     assert body in done
     assert done.endswith('if __name__ == "__main__":\n    _main()\n')
-    for rig, text in (("pulled", "stiffness * (speed * t - x)"), ("slider", "(F_a - F) / mass")):
+    for rig, text in (
+        ("pulled", "stiffness * (speed * t - x)"),
+        ("slider", "(F_a - F) * (1.0 / mass)"),
+    ):
         assert text in said(gms_fsm("code", "--law", law, "--rig", rig))
     assert said(gms_fsm("code", "--law", law, "--debug")) == done
     assert said(gms_fsm("--version")) == f"gms-fsm {__version__}\n"

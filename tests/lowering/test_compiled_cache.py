@@ -34,7 +34,8 @@ from integrators.machine_code import calls
 from integrators.machine_code.front_end import statements
 from integrators.machine_code.layout import BlockLayout
 from integrators.runners import columns
-from integrators.runners import compiled as machine
+from integrators.runners import compiled as engines
+from integrators.runners import edition as machine
 from tests.helpers import CURVE, ROOT, open_loop, stick_slip
 
 pytestmark = pytest.mark.slow
@@ -324,7 +325,7 @@ def test_the_name_depends_on_all_that_the_code_depends_on(monkeypatch: pytest.Mo
         "another layout": _name(elements=5),
         "lengths that are variables": _name(elements=200),
     }
-    for place, attribute in ((machine, "edition"), (machine, "target_name")):
+    for place, attribute in ((engines, "edition"), (engines, "target_name")):
         with monkeypatch.context() as patch:
             patch.setattr(place, attribute, lambda: "another")
             names[attribute] = _name()

@@ -83,7 +83,8 @@ def test_a_pid_in_python_is_that_of_the_scenario() -> None:
         simulate(each, 0.2, engine="ifelse") for each in (replace(servo(), sampled=(pid,)), servo())
     )
     assert len(one.transitions) == len(other.transitions) == 30
-    assert one.body("load").x[-1] == pytest.approx(other.body("load").x[-1], rel=1e-9)
+    end = other.body("load").x[-1]  # rtol, for the steps differ: they begin anew at every call
+    assert one.body("load").x[-1] == pytest.approx(end, rel=1e-6)
 
 
 def test_the_run_is_played_again_without_a_call() -> None:
