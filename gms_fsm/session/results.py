@@ -16,6 +16,7 @@ from gms_fsm.foundation.display import displayed, short_repr
 from gms_fsm.foundation.quantities import Scale, in_words, trimmed
 from gms_fsm.traces.system_scope import units_of
 from gms_fsm.traces.trace import Trace
+from integrators.advance import tick_at
 
 SAMPLES = 2000  # number of common times at which two branches are compared
 Part = TypeVar("Part")
@@ -295,7 +296,7 @@ def compared(numbers: tuple[int, int], first: Trace, second: Trace) -> BranchCom
     t = min(float(first.t[-1]), float(second.t[-1]))
     logs = [trace.transitions[trace.transitions.t <= t] for trace in (first, second)]
     fired, moments = [[*map(_who, log)] for log in logs], [log.t.tolist() for log in logs]
-    number = first_unlike(fired, moments)
+    number = first_unlike(fired, moments, 2.0 * tick_at(t))  # a switch is located to a tick
     differs = None
     if number is not None:
         differs = min(float(each[number]) for each in moments if number < len(each))

@@ -526,8 +526,8 @@ class Session:
         Returns
         -------
         BranchComparison
-            Transitions, and largest differences of the first variable and F; of a system those of
-            every body and contact.
+            Transitions (of which times two clock ticks apart are the same), and largest differences
+            of the first variable and F; of a system those of every body and contact.
 
         Raises
         ------

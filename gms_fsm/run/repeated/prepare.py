@@ -87,7 +87,7 @@ def prepare(
     >>> model = GMS(GMSParameters.paper("stick-slip"), law="signed")
     >>> pulled = prepare(model, PulledSlider(1.0, 2.0, 0.1), 20.0, engine="machines")
     >>> [round(float(pulled(mass=mass).v.max()), 3) for mass in (0.5, 2.0)]
-    [0.183, 0.164]
+    [0.183, 0.165]
     >>> pulled.end({"F_s": 1.2, "k2": 3.0}).states[0]
     'slip'
     """
