@@ -144,6 +144,11 @@ def knot_after(plan: RunPlan, now: Now, out: Output) -> float:
     return knots[out.next_knot] if out.next_knot < len(knots) else INFINITY
 
 
+def limit_after(plan: RunPlan, now: Now, out: Output) -> float:
+    """Return the end of the next step at the latest: the next stop or knot."""
+    return min(now.t_stop, knot_after(plan, now, out))
+
+
 def calm_step(plan: RunPlan, mode: list[int]) -> float:
     """Return the length of steps before a crossing; infinity if nothing relaxes in these modes."""
     fastest, relaxing = INFINITY, plan.relaxing
@@ -294,23 +299,19 @@ def advance(
 def _next_end(plan: RunPlan, now: Now, out: Output) -> tuple[float, float, float]:
     """Return the end of the next step, when it is seen, and the significant difference of times.
 
-    It follows the grid or the controller, but not past a stop, and avoids a sliver before one: two
-    equal steps have a smaller error than a long and a short one. Not before an end of the run at
-    which nothing changes: what comes before must not know of it.
+    It follows the grid or the controller, but not past a stop, and avoids a sliver before one. Two
+    equal steps before a stop would have a smaller error than a long and a short one, but what comes
+    before the end of a run must not know of it, nor of what may follow.
     """
     t, control = now.t, plan.control
     if control.step > 0.0:
         t_new = next_on_grid(control, t)
     else:
         t_new = t + min(now.h, control.max_step)
-    knot = knot_after(plan, now, out)
-    limit = min(now.t_stop, knot)
-    changes = limit < plan.t_end or knot <= limit
+    limit = limit_after(plan, now, out)
     tick = TICK * max(abs(t), abs(t_new))
     if t_new + tick >= limit:
         t_new = limit
-    elif changes and not control.step > 0.0 and t_new + (t_new - t) > limit:
-        t_new = t + 0.5 * (limit - t)
     return t_new, min(t_new, now.seen), tick
 
 

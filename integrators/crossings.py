@@ -53,8 +53,8 @@ MOST_BENT = 0.1
 # A margin above this is not below zero: there is no number between them. So one comparison decides.
 JUST_BELOW = -5e-324
 DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
-# Where more relations are watched, they change one soon after another. Steps are aimed at the next
-# change, and a search goes on longer by slopes alone.
+# Where more relations are watched, they change one soon after another: steps are aimed at the next
+# change.
 MANY = 500
 AIMED = 1.05  # of the time to the next change
 

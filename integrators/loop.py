@@ -80,6 +80,8 @@ END_STANDS = 2.0**-53
 CLOCK_CRAWLS = 1e-6
 STATE_STANDS = 0.1
 
+SHORTER = 0.8  # of the step before a tick: the interval's steps are then more alike
+
 # Events (TOO_SMALL and NOT_FINITE are the kernel's).
 ROWS, FIRING, FIRED, STOPPED, DONE, SLID = 10, 11, 12, 13, 14, 15
 MACHINE_LIVELOCK, RELATION_LIVELOCK, ADVANCE, TOO_MANY_STEPS, PAUSED = 16, 17, 18, 19, 20
@@ -452,8 +454,9 @@ def _first_step(
 ) -> float:
     """Return the first step of an arc: to the next change if that is near, and many are watched.
 
-    Where something ticked and nothing switched the steps stay as long as they were: a controller
-    changes little, and one that changes much costs a rejected step.
+    Where something ticked and nothing switched it is little shorter than the steps before: a
+    controller changes little, and one that changes much, or a signal that jumps at the tick, costs
+    a rejected step.
     """
     if len(relations.truth) > MANY and memory.active > MANY and now.h > 0.0:
         aimed = aimed_step(motion, now, 0.1 * now.h, listed(relations, memory.active))
@@ -462,7 +465,7 @@ def _first_step(
     last = memory.jump - 1
     ticked = last >= 0 and plan.jumps[last] == now.t and plan.ticks[last] > 0
     if ticked and memory.microstep == 0 and now.h > 0.0:
-        return now.h
+        return SHORTER * now.h
     knot, order = knot_after(plan, now, out), plan.method.error_order
     return starting_step(motion, order, plan.control, now, knot, scratch)
 

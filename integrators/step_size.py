@@ -116,7 +116,7 @@ def root_of(error: float, order: int) -> float:
     Returns
     -------
     float
-        The fourth root; of an order above 4 the eighth one, within 2 %.
+        The fourth root; of an order above 4 the eighth one, between 0.02 and 1 within 2 %.
 
     Examples
     --------
@@ -125,7 +125,7 @@ def root_of(error: float, order: int) -> float:
     >>> round(root_of(0.5, 5) / 0.5**0.125, 2)
     1.01
     """
-    if order > 4 and error > 0.02:
+    if order > 4 and 0.02 < error <= 1.0:
         return (0.104 + error) / (0.181 + 0.941 * error)
     root = math.sqrt(math.sqrt(max(error, 1e-10)))
     return math.sqrt(root) if order > 4 else root

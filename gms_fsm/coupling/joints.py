@@ -179,13 +179,14 @@ class Joints:
         if self.inputs or self.each[0].enters or not ONE_AT_A_TIME:
             self.alone.inside = 1  # no short calls
         self._found: LastSample | None = None  # unless the last call was a short one
+        self._at: float | None = None  # the time, while a call tries others
 
     # ------------------------------------------------------------------ samples
     @property
     def t(self) -> float:
         """The present time."""
         end: float = self._first.end
-        return end
+        return end if self._at is None else self._at
 
     def advance(
         self, v0: Any, v1: Any, dt: float, inputs: Mapping[str, Line], t: Any = None
@@ -200,7 +201,7 @@ class Joints:
             end = now + dt
             if not now < end < LATEST:
                 end = end_of(now, dt) if dt == dt else end_at(now, t)
-            before, found = self._copy(), self._found
+            before, found, self._at = self._copy(), self._found, now
             lost: Lost = {}
             try:
                 force = self._step(v0, v1, end, inputs, lost, now)
@@ -212,6 +213,7 @@ class Joints:
                 self._free(found[5])
             return force
         finally:
+            self._at = None
             alone.inside -= 1
             alone.leave()
 
@@ -220,12 +222,13 @@ class Joints:
         with self.alone:
             now = self._first.end
             end = _in_reach(now + dt)
-            before = self._copy()
+            before, self._at = self._copy(), now
             try:
                 return self._step(v0, v1, end, inputs, {}, now)
             finally:
                 self._take(before)
                 self._free(before)
+                self._at = None
 
     def send(self, event: str) -> None:
         """Let an event wait for the next sample of all joints that wait for it."""
@@ -283,11 +286,13 @@ class Joints:
         """Return the force, or its integral, had the last velocity been v1."""
         _, v0, _, inputs, _, before = self._sample()
         end, now = self.t, self._copy()
+        self._at = end
         try:
             self._take(before)
             return self._step(v0, v1, end, inputs, {}, end, mean=mean)
         finally:
             self._take(now)
+            self._at = None
 
     # ------------------------------------------------------------------ going back
     def snapshot(self) -> Snapshot:

@@ -116,7 +116,7 @@ class FrictionState:
         # From here to the end of the call of machine code no other thread can come between.
         if usual and not inputs and not self._alone.inside:
             given = self._given
-            given[0], given[1], given[2] = v0, v1, dt
+            given[0], given[1], given[2], given[3] = v0, v1, dt, nan
             force = self._advance()
             if force < inf:
                 return force

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gms_fsm.systems.parts import Body
 
 ZERO = Number(0.0)
+TINY = 1e-300  # an inertia that is not larger counts as 0: one over it might be infinite
 WORDS = {*FUNCTIONS, *CONSTANTS, "pow"} - {*YIELDING}  # of the language
 Text: TypeAlias = str | float  # an expression, or just a number
 
@@ -107,8 +108,8 @@ def checked_numbers(
 
 
 def is_positive(tree: Value, numbers: Mapping[str, float]) -> bool:
-    """Tell whether a value is positive and finite, as far as numbers alone decide."""
-    return not names_in(tree) <= numbers.keys() or 0.0 < constant(tree, numbers) < math.inf
+    """Tell whether an inertia is positive and finite, as far as numbers alone decide."""
+    return not names_in(tree) <= numbers.keys() or TINY < constant(tree, numbers) < math.inf
 
 
 def constant(tree: Value, numbers: Mapping[str, float]) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import platform
+
 # Functions that run once per arc, once per event, or never in most runs, and one that is long. Not
 # putting them inline saves a third of the compilation and costs nothing; with those of the bracket
 # it does.
@@ -27,11 +29,13 @@ ALWAYS = (
 INLINE = dict.fromkeys(NOT_INLINE, False) | dict.fromkeys(ALWAYS, True)
 # Arrays that nothing else that these functions are given overlaps: what is read stays in registers.
 APART = {"observe_alike": ("seen", "table")}
-# Every step calls these; an entry that is among them has no other kind of function.
+# Every step calls these. If the first entry of an object is among them, all its functions are.
 HOT = {
     "advance", "advance_by", "peek_by", "_along", "first_change", "_bracket", "_error",
     "interpolate", "margins", "observe_free", "_probe", "rate_in_lanes", "_search",
     "slope_in_lanes", "switch", "take_step",
 }  # fmt: skip
 # It is called in the midst of a step and saves the registers it uses: its callers use nearly all.
-KEEPING = {"exp"}
+# Other processors have no such calls.
+HAS_SUCH = platform.machine().lower() in ("x86_64", "amd64", "aarch64", "arm64")
+KEEPING = {"exp"} if HAS_SUCH else set[str]()

@@ -121,7 +121,10 @@ class ShortArguments(NamedTuple):
 
 
 class ObserveArguments(NamedTuple):
-    """The arguments of `integrators.runners.observing.observe_rows`, without the last two."""
+    """The arguments of `integrators.runners.observing.observe_rows`, without the last three.
+
+    Those of `observe_free` are among them.
+    """
 
     functions: Functions
     observe: Callable[..., Any]
@@ -346,7 +349,7 @@ class CompiledStepper:
     layout : BlockLayout
         Of a block, which contains all its arrays.
     short : BlockLayout
-        Of a block for the latter two, which begins in the same way.
+        Of a block for `advance_by` and `peek_by`; it begins as the other one.
     library : Library
         Contains `entry`, `each`, `advance_by` and `peek_by`.
     """

@@ -29,8 +29,6 @@ from integrators.tangents import motion
 from integrators.tangents import run as tangent_run
 from integrators.tangents import switches as tangent_switches
 
-__all__ = ["digest", "edition"]
-
 # What is translated: the loop, and what it calls.
 LOOPS = (
     elementary, whole_numbers, steps, step_size, crossings, advance, sliding, sliding_bounds, jolts,

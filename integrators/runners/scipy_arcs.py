@@ -21,7 +21,7 @@ from integrators.advance import (
     REACHED,
     REDO,
     TOO_SMALL,
-    knot_after,
+    limit_after,
     next_on_grid,
     put_row,
     tick_at,
@@ -71,7 +71,7 @@ class SciPyStepper:
 
     def _limit(self) -> float:
         plan, now = self.buffers.plan, self.buffers.now
-        limit = min(now.t_stop, knot_after(plan, now, self.buffers.out))
+        limit = limit_after(plan, now, self.buffers.out)
         return min(limit, next_on_grid(plan.control, now.t)) if self.options.step else limit
 
     def _solver_to(self, limit: float) -> Any:

@@ -157,13 +157,6 @@ def test_a_narrowly_accepted_step_is_followed_by_a_shorter_one(start: float) -> 
     assert narrow >= 1
 
 
-def test_the_last_two_steps_before_a_stop_are_equal_but_not_before_the_end_of_the_run() -> None:
-    run = _Run()
-    assert run.to(1.0, h=0.7, steps=1)[1] == 0.5
-    assert run.to(1.0, h=0.7, steps=1)[1] == 1.0
-    assert run.to(100.0, h=70.0, steps=1)[1] == 71.0
-
-
 def test_the_controller_remembers_the_last_error_but_never_that_there_was_none() -> None:
     none = _Run().to(1.0, steps=1)[3]
     assert none == memory_of(root_of(0.0, 5)) == math.sqrt(LEAST_ROOT)

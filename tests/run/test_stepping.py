@@ -12,7 +12,7 @@ import pickle
 import threading
 from collections.abc import Callable
 from fractions import Fraction
-from math import sin
+from math import nan, sin
 from typing import Any
 
 import numpy as np
@@ -486,6 +486,16 @@ def test_samples_of_six_threads(kind: str, engine: str) -> None:
     for _ in range(sum(taken)):
         alone.advance(v, v, 1e-3)
     assert known(one)[:3] == known(alone)[:3]
+
+
+@pytest.mark.parametrize("engine", sorted({"ifelse", FASTEST}))
+def test_a_duration_that_is_no_number_is_refused_after_a_call_with_a_time(engine: str) -> None:
+    friction = FrictionState(stick_slip("signed"), engine=engine)
+    friction.advance_to(0.1, 0.1, 0.02)
+    for call in (friction.advance, friction.peek):
+        with pytest.raises(ParameterError, match="dt is nan"):
+            call(0.1, 0.1, nan)
+        assert friction.t == 0.02
 
 
 @made

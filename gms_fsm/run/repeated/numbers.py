@@ -18,7 +18,7 @@ from gms_fsm.language import Name, Value, names_in
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.repeated.block import Place, RepeatedRun
 from gms_fsm.systems import rigs
-from gms_fsm.systems.given import is_positive
+from gms_fsm.systems.given import TINY, is_positive
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import joined, known_in, label_in, numbers_of, varied
 from gms_fsm.systems.reading.values import CURVE
@@ -27,7 +27,7 @@ from gms_fsm.systems.signals import Function
 from gms_fsm.systems.springs import field_of
 
 MOST_SPARE = 4  # runs that wait to be repeated
-POSITIVE = bounds_of("> 0")
+POSITIVE = bounds_of(f"> {TINY}")
 EXACT = 2**53  # whole numbers that are floats
 
 
