@@ -280,8 +280,9 @@ _latest = weakref.ref[FloatArray](np.empty(0))  # times that were found to incre
 def _increasing(t_eval: ArrayLike) -> FloatArray:
     global _latest
     known = _latest()
-    unchanged = known is not None and not known.flags.writeable
-    if unchanged and isinstance(t_eval, np.ndarray) and are_same(t_eval, known):
+    if known is not None and known.flags.writeable:
+        known = None  # somebody may have changed them
+    if known is not None and isinstance(t_eval, np.ndarray) and are_same(t_eval, known):
         return known
     if isinstance(t_eval, float | int):
         raise ParameterError(
