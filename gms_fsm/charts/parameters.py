@@ -77,15 +77,19 @@ def bounds_of(rule: str) -> tuple[Bound, ...]:
 
 
 @functools.lru_cache(maxsize=256)
-def _limits(rule: str) -> tuple[tuple[Callable[[Any, Any], Any], float], ...]:
+def fixed_bounds(rule: str) -> tuple[Bound, ...]:
     """Return the comparisons with numbers in a rule."""
-    return tuple(
-        (_HOLDS[each.op], each.limit) for each in bounds_of(rule) if not isinstance(each.limit, str)
-    )
+    return tuple(bound for bound in bounds_of(rule) if not isinstance(bound.limit, str))
 
 
 @functools.lru_cache(maxsize=256)
-def _relative(rule: str) -> tuple[Bound, ...]:
+def _limits(rule: str) -> tuple[tuple[Callable[[Any, Any], Any], Any], ...]:
+    """Return the operators and numbers of these comparisons."""
+    return tuple((_HOLDS[bound.op], bound.limit) for bound in fixed_bounds(rule))
+
+
+@functools.lru_cache(maxsize=256)
+def relative_bounds(rule: str) -> tuple[Bound, ...]:
     """Return the comparisons with other parameters in a rule."""
     return tuple(bound for bound in bounds_of(rule) if isinstance(bound.limit, str))
 
@@ -292,8 +296,8 @@ def checked_scalar(name: str, value: Any, rule: str) -> float:
         raise ParameterError("it is too large", place=name, advice="it must be finite") from None
     if not math.isfinite(number):
         raise ParameterError("it must be finite", place=name, value=number)
-    for bound in bounds_of(rule):
-        if not isinstance(bound.limit, str) and not bound.holds(number, bound.limit):
+    for bound in fixed_bounds(rule):
+        if not bound.holds(number, bound.limit):
             raise ParameterError(f"it must be {bound.text}", place=name, value=number)
     return number
 
@@ -405,7 +409,7 @@ def checked_values(
     known = {each.name: each for each in parameters}
     checked = {name: _checked(each, values[name], n) for name, each in known.items()}
     for each in known.values():
-        for bound in _relative(each.rule):
+        for bound in relative_bounds(each.rule):
             if (other := known.get(str(bound.limit))) is not None:
                 _compare(each, other, bound, checked)
     return checked

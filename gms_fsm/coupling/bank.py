@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from math import inf, isfinite, nan
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -118,7 +118,9 @@ class FrictionBank:
             If a joint cannot continue. In both cases all joints are as they were before.
         """
         v0, v1 = self._checked(v0, v1)
-        forces: FloatArray = self._joints.advance(v0, v1, _time(dt), self._lines(inputs))
+        forces: FloatArray = self._joints.advance(
+            v0, v1, checked_scalar("dt", dt, ">= 0"), self._lines(inputs)
+        )
         return forces
 
     def advance_to(
@@ -168,7 +170,9 @@ class FrictionBank:
             As in `advance`.
         """
         v0, v1 = self._checked(v0, v1)
-        forces: FloatArray = self._joints.peek(v0, v1, _time(dt), self._lines(inputs))
+        forces: FloatArray = self._joints.peek(
+            v0, v1, checked_scalar("dt", dt, ">= 0"), self._lines(inputs)
+        )
         return forces
 
     def send(self, event: str) -> None:
@@ -306,8 +310,3 @@ class FrictionBank:
             If it cannot be such an array; the state stays as it was.
         """
         self._joints.from_array(array)
-
-
-def _time(dt: Any) -> float:
-    """Return the length of a sample, or refuse it."""
-    return dt if type(dt) is float and 0.0 <= dt < inf else checked_scalar("dt", dt, ">= 0")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import inf, isfinite, nan
+from math import inf, nan
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -302,9 +302,6 @@ class FrictionState:
 
 def _checked(v0: Any, v1: Any, dt: Any) -> tuple[float, float, float]:
     """Return the arguments of a sample as floats, or refuse them."""
-    usual = isinstance(v0, float) and isinstance(v1, float) and isinstance(dt, float)
-    if usual and isfinite(v0) and isfinite(v1) and 0.0 <= dt < inf:
-        return v0, v1, dt
     return _finite("v0", v0), _finite("v1", v1), checked_scalar("dt", dt, ">= 0")
 
 

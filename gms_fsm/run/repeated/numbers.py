@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.charts.parameters import Bound, bounds_of
+from gms_fsm.charts.parameters import Bound, fixed_bounds, relative_bounds
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.gradients.directions import Directions
 from gms_fsm.language import Name, Value, names_in
@@ -27,7 +27,7 @@ from gms_fsm.systems.signals import Function
 from gms_fsm.systems.springs import field_of
 
 MOST_SPARE = 4  # runs that wait to be repeated
-POSITIVE = bounds_of(f"> {TINY}")
+POSITIVE = fixed_bounds(f"> {TINY}")
 EXACT = 2**53  # whole numbers that are floats
 
 
@@ -229,23 +229,22 @@ def known_numbers(start: Problem) -> dict[str, KnownNumber]:
             found[name] = KnownNumber(
                 places[label],
                 n,
-                (*(u for u in bounds_of(parameter.rule) if not isinstance(u.limit, str)), *mass),
+                (*fixed_bounds(parameter.rule), *mass),
                 [],
                 tuple(u for u in inertias if label in names_in(u) and u != Name(label)),
                 nonzero=label in system.numbers,
             )
     for name, (parameter, _) in names.items():
-        for bound in bounds_of(parameter.rule):
-            if isinstance(bound.limit, str):
-                other = f"{name.removesuffix(parameter.name)}{bound.limit}"
-                if {name, other} <= {*found}:
-                    side = 1 if bound.op[0] == ">" else -1
-                    pair = found[name].place, side, found[other].place
-                    found[name].pairs.append(pair)
-                    found[other].pairs.append(pair)
-                else:
-                    found.pop(name, None)
-                    found.pop(other, None)
+        for bound in relative_bounds(parameter.rule):
+            other = f"{name.removesuffix(parameter.name)}{bound.limit}"
+            if {name, other} <= {*found}:
+                side = 1 if bound.op[0] == ">" else -1
+                pair = found[name].place, side, found[other].place
+                found[name].pairs.append(pair)
+                found[other].pairs.append(pair)
+            else:
+                found.pop(name, None)
+                found.pop(other, None)
     for name, one in numbers_of(what).items():
         if one.element is not None and one.whole in found and name not in names:
             whole = found[one.whole]
