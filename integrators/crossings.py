@@ -56,6 +56,9 @@ DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
 # Where more relations are watched, they change one soon after another: steps are aimed at the next
 # change.
 MANY = 500
+# So many relations are compared side by side, also those that are not watched. Fewer are compared
+# sooner one by one, and of more most are not watched.
+FEWEST_BESIDE, MOST_BESIDE = 8, 64
 AIMED = 1.05  # of the time to the next change
 
 
@@ -154,7 +157,12 @@ def any_changed(w: Watched, margin: Vector) -> bool:
     bool
         True at the first difference.
     """
-    truth, above = w.truth, w.above
+    watch, truth, above = w.watch, w.truth, w.above
+    if FEWEST_BESIDE <= len(truth) <= MOST_BESIDE:
+        changed = False
+        for r in range(len(truth)):
+            changed = changed or (watch[r] != 0 and (margin[r] > above[r]) != truth[r])
+        return changed
     for r in w.active:
         g = margin[r]
         if (g > above[r]) != truth[r]:
@@ -164,8 +172,13 @@ def any_changed(w: Watched, margin: Vector) -> bool:
 
 def copy_margins(w: Watched, source: Vector, target: Vector) -> None:
     """Copy the active margins."""
-    for r in w.active:
-        target[r] = source[r]
+    if FEWEST_BESIDE <= len(source) <= MOST_BESIDE:
+        for r in range(len(source)):
+            if w.watch[r] != 0:
+                target[r] = source[r]
+    else:
+        for r in w.active:
+            target[r] = source[r]
 
 
 def is_quiet_step(motion: ArcMotion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> bool:
@@ -441,15 +454,28 @@ def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
 
     Unchanged at both ends.
     """
-    truth, above = w.truth, w.above
-    for r in w.active:
-        if (middle[r] > above[r]) != truth[r]:
-            return False
-        sign = -1.0 if truth[r] else 1.0  # makes an unchanged margin negative
-        a, m, b = sign * left[r], sign * middle[r], sign * right[r]
-        first, second = m - a, b - m
-        bend = abs(second - first)
-        monotone = bend < min(abs(first), abs(second))  # bend is larger if their signs differ
-        if not monotone and max(a, m, b) + WARY * bend >= 0.0 and bend > 0.0:
-            return False
+    doubtful = True
+    if FEWEST_BESIDE <= len(left) <= MOST_BESIDE:
+        doubtful = False
+        for r in range(len(left)):
+            first, second = middle[r] - left[r], right[r] - middle[r]
+            # More is bent than the smaller one if their signs differ.
+            monotone = abs(second - first) < min(abs(first), abs(second))
+            doubtful = doubtful or (w.watch[r] != 0 and not monotone)
+    if doubtful:
+        for r in w.active:
+            if _may_change(w, r, left[r], middle[r], right[r]):
+                return False
     return True
+
+
+def _may_change(w: Watched, r: int, a: float, m: float, b: float) -> bool:
+    """Return whether a margin may change between three points."""
+    first, second = m - a, b - m
+    bend = abs(second - first)
+    if bend < min(abs(first), abs(second)):  # monotone: the middle is between the ends
+        return False
+    if (m > w.above[r]) != w.truth[r]:
+        return True
+    largest = -min(a, m, b) if w.truth[r] else max(a, m, b)  # of what is negative if unchanged
+    return largest + WARY * bend >= 0.0 and bend > 0.0

@@ -11,6 +11,17 @@ import re
 import struct
 from collections.abc import Sequence
 
+from integrators.machine_code.lanes import (
+    ALIAS,
+    DECLARED,
+    TYPES,
+    WIDE,
+    LaneWriter,
+    Turns,
+    groups_of,
+    operation,
+    turns_of,
+)
 from integrators.machine_code.tree import (
     Address,
     AddressOf,
@@ -40,17 +51,9 @@ from integrators.machine_code.tree import (
     TypedFunction,
     While,
 )
-from integrators.machine_code.tuning import KEEPING
+from integrators.machine_code.tuning import FLOWS, IN_ROWS, KEEPING, WITH_FLOWS
 
 __all__ = ["llvm_text"]
-
-_TYPES = {"f": "double", "i": "i64", "b": "i1", "p": "ptr"}
-_FLOATS = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
-_INTEGERS = {
-    "+": "add", "-": "sub", "*": "mul", "&": "and", "|": "or", "^": "xor", "<<": "shl",
-    ">>": "ashr",
-}  # fmt: skip
-_SIGNS = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge"}
 
 
 def llvm_text(module: Module) -> str:
@@ -77,16 +80,16 @@ def llvm_text(module: Module) -> str:
     True
     """
     foreign: dict[str, int] = {}
-    functions = [_Writer(function, module, foreign).text() for function in module.functions]
+    groups = groups_of(module, lambda name: _plain(name) in FLOWS)
+    functions = [_Writer(each, module, foreign, groups).text() for each in module.functions]
     lines = [_table(table) for table in module.tables]
     for name, kinds in module.outer.items():
-        lines.append(f"declare i64 @{name}({', '.join(_TYPES[kind] for kind in kinds)})")
+        lines.append(f"declare i64 @{name}({', '.join(TYPES[kind] for kind in kinds)})")
     if module.callbacks and module.outer:  # those of the other module
         lines.append(f"@callbacks = external global [{module.callbacks} x ptr]")
     elif module.callbacks:
         lines.append(f"@callbacks = global [{module.callbacks} x ptr] zeroinitializer")
-    lines += ["declare double @llvm.sqrt.f64(double)", "declare double @llvm.fabs.f64(double)"]
-    lines += ["declare double @llvm.copysign.f64(double, double)"]
+    lines += DECLARED
     for name, count in foreign.items():
         arguments = ", ".join(["double"] * count)
         lines.append(f"declare double @{name}({arguments}) nounwind memory(none)")
@@ -96,11 +99,10 @@ def llvm_text(module: Module) -> str:
         *(f'!{k} = !{{!"{name}", !0}}' for k, name in enumerate(("f", "i", "b", "p"), 1)),
         *(f"!{k + 4} = !{{!{k}, !{k}, i64 0}}" for k in range(1, 5)),
     ]
+    aliases += ["!11 = distinct !{!11, !12, !13}", '!12 = !{!"llvm.loop.unroll.disable"}']
+    aliases += ['!13 = !{!"llvm.loop.vectorize.enable", i1 false}']
     aliases += ["!9 = distinct !{!9, !10}", '!10 = !{!"llvm.loop.unroll.full"}']
     return "\n".join([*lines, *functions, *aliases, ""])
-
-
-_ALIAS = {"f": "!5", "i": "!6", "b": "!7", "p": "!8"}
 
 
 def _table(table: ConstantTable) -> str:
@@ -133,16 +135,23 @@ def _calls(body: Sequence[Statement]) -> bool:
 class _Writer:
     """Writes one function."""
 
-    def __init__(self, function: TypedFunction, module: Module, foreign: dict[str, int]) -> None:
-        self.function, self.module, self.foreign = function, module, foreign
+    def __init__(
+        self,
+        function: TypedFunction,
+        module: Module,
+        foreign: dict[str, int],
+        groups: Sequence[tuple[int, int]],
+    ) -> None:
+        self.function, self.module, self.foreign, self.groups = function, module, foreign, groups
         self.results = dict.fromkeys(module.outer, "i")
         self.results |= {each.name: each.results for each in module.functions}
         self.keeping = {
             each.name
             for each in module.functions
-            if not each.entry and re.sub(r"_\d+$", "", each.name) in KEEPING
+            if not each.entry and _plain(each.name) in KEEPING
         }
         self.lines: list[str] = []
+        self.places: list[str] = []  # on the stack, of what lanes assign to
         self.counter = 0
         self.loops: list[tuple[str, str]] = []  # labels of continue and break
         self.ended = False
@@ -154,7 +163,7 @@ class _Writer:
         names = ", ".join(map(self.parameter, function.parameters))
         head = "define" if function.entry else "define internal"
         for each in function.variables:
-            self.lines.append(f"  %{_name(each.name)} = alloca {_TYPES[each.kind]}")
+            self.lines.append(f"  %{_name(each.name)} = alloca {TYPES[each.kind]}")
         self.block(function.body)
         if not self.ended:
             self.lines.append("  ret void" if not function.results else "  unreachable")
@@ -164,7 +173,7 @@ class _Writer:
         calls = ' "no-builtin-memcpy"' if function.apart else ""
         head += self.convention(function.name)
         opening = f"{head} {results} @{function.name}({names}) nounwind{inline}{calls} {{"
-        return "\n".join([opening, "entry:", *self.lines, "}"])
+        return "\n".join([opening, "entry:", *self.places, *self.lines, "}"])
 
     def parameter(self, local: Local) -> str:
         """Return a parameter with what is known of it."""
@@ -173,7 +182,7 @@ class _Writer:
             known = " noalias"
         elif self.function.apart and self.module.words and name == "block":
             known = f" align 8 dereferenceable({8 * self.module.words})"
-        return f"{_TYPES[local.kind]}{known} %{_name(local.name)}"
+        return f"{TYPES[local.kind]}{known} %{_name(local.name)}"
 
     @staticmethod
     def result(kinds: str) -> str:
@@ -181,8 +190,8 @@ class _Writer:
         if not kinds:
             return "void"
         if len(kinds) == 1:
-            return _TYPES[kinds]
-        return "{" + ", ".join(_TYPES[kind] for kind in kinds) + "}"
+            return TYPES[kinds]
+        return "{" + ", ".join(TYPES[kind] for kind in kinds) + "}"
 
     def new(self, line: str) -> str:
         """Write a line with a result, and return its name."""
@@ -224,14 +233,14 @@ class _Writer:
         """Write a statement."""
         match statement:
             case Assign(target=target, value=value):
-                kind = _TYPES[target.kind]
+                kind = TYPES[target.kind]
                 self.lines.append(f"  store {kind} {self.value(value)}, ptr %{_name(target.name)}")
             case AssignMany(targets=targets, call=call):
                 made = self.call(call)
                 kinds = self.result(self.results[call.name])
                 for k, target in enumerate(targets):
                     part = self.new(f"extractvalue {kinds} {made}, {k}")
-                    kind = _TYPES[target.kind]
+                    kind = TYPES[target.kind]
                     self.lines.append(f"  store {kind} {part}, ptr %{_name(target.name)}")
             case Put(kind=kind, address=address, value=value):
                 self.put(kind, address, self.value(value))
@@ -257,9 +266,9 @@ class _Writer:
         place = self.address(address)
         if kind == "b":
             value = self.new(f"zext i1 {value} to i8")
-            self.lines.append(f"  store i8 {value}, ptr {place}, !tbaa {_ALIAS[kind]}")
+            self.lines.append(f"  store i8 {value}, ptr {place}, !tbaa {ALIAS[kind]}")
         else:
-            self.lines.append(f"  store {_TYPES[kind]} {value}, ptr {place}, !tbaa {_ALIAS[kind]}")
+            self.lines.append(f"  store {TYPES[kind]} {value}, ptr {place}, !tbaa {ALIAS[kind]}")
 
     def give(self, values: Sequence[str]) -> None:
         """Return numbers."""
@@ -267,11 +276,11 @@ class _Writer:
         if not kinds:
             self.lines.append("  ret void")
         elif len(kinds) == 1:
-            self.lines.append(f"  ret {_TYPES[kinds]} {values[0]}")
+            self.lines.append(f"  ret {TYPES[kinds]} {values[0]}")
         else:
             whole, whole_type = "undef", self.result(kinds)
             for k, (kind, value) in enumerate(zip(kinds, values, strict=True)):
-                whole = self.new(f"insertvalue {whole_type} {whole}, {_TYPES[kind]} {value}, {k}")
+                whole = self.new(f"insertvalue {whole_type} {whole}, {TYPES[kind]} {value}, {k}")
             self.lines.append(f"  ret {whole_type} {whole}")
         self.ended = True
 
@@ -303,6 +312,14 @@ class _Writer:
 
     def counted(self, statement: For) -> None:
         """Write a loop over a range."""
+        name = _plain(self.function.name)
+        if name not in IN_ROWS and (turns := turns_of(statement)):
+            if not turns.stop:
+                self.in_lanes(turns)
+                return
+            for first, width in turns.pieces(self.groups, alone=name in WITH_FLOWS):
+                LaneWriter(self, turns, first, width).write()
+            return
         place = f"%{_name(statement.target.name)}"
         head, inside, more, end = map(self.label, ("head", "body", "more", "end"))
         stop = self.value(statement.stop)
@@ -327,6 +344,32 @@ class _Writer:
             if turns <= MOST_TURNS and _calls(statement.body):
                 self.lines[-1] += ", !llvm.loop !9"
         self.place(end)
+
+    def in_lanes(self, turns: Turns) -> None:
+        """Write a loop as one over vectors, and what is left as one over numbers."""
+        place = f"%{_name(turns.loop.target.name)}"
+        start, stop = self.value(turns.loop.start), self.value(turns.loop.stop)
+        last = self.new(f"sub nsw i64 {stop}, {WIDE - 1}")
+        for one, other in turns.apart:  # if places are neighbours, there are no vectors
+            gap = self.new(f"sub i64 {self.value(one)}, {self.value(other)}")
+            moved = self.new(f"add i64 {gap}, {WIDE - 1}")
+            near = self.new(f"icmp ult i64 {moved}, {2 * WIDE - 1}")
+            both = self.new(f"and i1 {near}, {self.new(f'icmp ne i64 {gap}, 0')}")
+            last = self.new(f"select i1 {both}, i64 {start}, i64 {last}")
+        self.lines.append(f"  store i64 {start}, ptr {place}")
+        for width, end in ((WIDE, last), (1, stop)):
+            head, inside, after = map(self.label, ("head", "body", "end"))
+            self.jump(head)
+            self.place(head)
+            now = self.new(f"load i64, ptr {place}")
+            self.branch(self.new(f"icmp slt i64 {now}, {end}"), inside, after)
+            self.place(inside)
+            LaneWriter(self, turns, now, width).write()
+            then = self.new(f"add nsw i64 {now}, {width}")
+            self.lines.append(f"  store i64 {then}, ptr {place}")
+            self.jump(head)
+            self.lines[-1] += ", !llvm.loop !11"
+            self.place(after)
 
     def test(self, expr: Expr, yes: str, no: str) -> None:
         """Go to one of two blocks."""
@@ -355,7 +398,7 @@ class _Writer:
             case Local(kind=kind, name=name):
                 if expr in self.parameters:
                     return f"%{_name(name)}"
-                return self.new(f"load {_TYPES[kind]}, ptr %{_name(name)}")
+                return self.new(f"load {TYPES[kind]}, ptr %{_name(name)}")
             case Global(name=name):
                 return f"@{name}"
             case Load(kind=kind, address=address):
@@ -381,7 +424,7 @@ class _Writer:
     def joined(self, expr: Logic | Choose) -> str:
         """Write an expression of which only a part is evaluated."""
         yes, no, end = self.label("yes"), self.label("no"), self.label("end")
-        kind = _TYPES[expr.kind]
+        kind = TYPES[expr.kind]
         if isinstance(expr, Choose):
             self.test(expr.test, yes, no)
             parts: tuple[Expr, Expr] = expr.yes, expr.no
@@ -404,9 +447,9 @@ class _Writer:
         """Read from memory."""
         place = self.address(address)
         if kind == "b":
-            byte = self.new(f"load i8, ptr {place}, !tbaa {_ALIAS[kind]}")
+            byte = self.new(f"load i8, ptr {place}, !tbaa {ALIAS[kind]}")
             return self.new(f"icmp ne i8 {byte}, 0")
-        return self.new(f"load {_TYPES[kind]}, ptr {place}, !tbaa {_ALIAS[kind]}")
+        return self.new(f"load {TYPES[kind]}, ptr {place}, !tbaa {ALIAS[kind]}")
 
     def address(self, address: Address) -> str:
         """Write an address."""
@@ -423,38 +466,22 @@ class _Writer:
         """Write an operation."""
         op, parts = expr.op, [self.value(each) for each in expr.operands]
         kind = expr.operands[0].kind
-        a, b, type_ = parts[0], parts[-1], _TYPES[kind]
-        if op in ("<", "<=", ">", ">=", "==", "!="):
-            return self.new(f"{_compare(op, kind)} {type_} {a}, {b}")
-        if op in ("min", "max"):
-            sign = _compare("<" if op == "min" else ">", kind)
-            test = self.new(f"{sign} {type_} {b}, {a}")
-            return self.new(f"select i1 {test}, {type_} {b}, {type_} {a}")
-        if op == "not":
-            return self.new(f"xor i1 {a}, true")
+        a, b = parts[0], parts[-1]
         if op == "float":
             sign = "uitofp" if kind == "b" else "sitofp"
-            return self.new(f"{sign} {type_} {a} to double")
+            return self.new(f"{sign} {TYPES[kind]} {a} to double")
         if op == "int":
             sign = "zext" if kind == "b" else "fptosi"
-            return self.new(f"{sign} {type_} {a} to i64")
-        if kind == "f":
-            if op == "neg":
-                return self.new(f"fneg double {a}")
-            if op in ("abs", "sqrt", "copysign"):
-                name = "fabs" if op == "abs" else op
-                given = ", ".join(f"double {each}" for each in parts)
-                return self.new(f"call double @llvm.{name}.f64({given})")
-            return self.new(f"{_FLOATS[op]} double {a}, {b}")
-        if op == "neg":
+            return self.new(f"{sign} {TYPES[kind]} {a} to i64")
+        if op == "neg" and kind != "f":
             return self.new(f"sub i64 0, {a}")
-        if op == "abs":
+        if op == "abs" and kind != "f":
             test = self.new(f"icmp slt i64 {a}, 0")
             minus = self.new(f"sub i64 0, {a}")
             return self.new(f"select i1 {test}, i64 {minus}, i64 {a}")
         if op in ("//", "%"):
             return self.floored(op, a, b)
-        return self.new(f"{_INTEGERS[op]} i64 {a}, {b}")
+        return operation(self.new, op, kind, parts)
 
     def floored(self, op: str, a: str, b: str) -> str:
         """Write a division of integers that rounds down, as Python's does."""
@@ -469,7 +496,7 @@ class _Writer:
 
     def call(self, call: Invoke) -> str:
         """Write a call of a function of the module."""
-        given = ", ".join(f"{_TYPES[each.kind]} {self.value(each)}" for each in call.arguments)
+        given = ", ".join(f"{TYPES[each.kind]} {self.value(each)}" for each in call.arguments)
         how = self.convention(call.name)
         line = f"call{how} {self.result(self.results[call.name])} @{call.name}({given})"
         if not self.results[call.name]:
@@ -482,13 +509,9 @@ class _Writer:
         return " preserve_allcc" if name in self.keeping else ""
 
 
-def _compare(op: str, kind: str) -> str:
-    """Return the instruction of a comparison; with NaN only != is true."""
-    if kind == "f":
-        return "fcmp une" if op == "!=" else f"fcmp o{'eq' if op == '==' else _SIGNS[op]}"
-    if op in ("==", "!="):
-        return "icmp eq" if op == "==" else "icmp ne"
-    return f"icmp {'u' if kind == 'b' else 's'}{_SIGNS[op]}"
+def _plain(name: str) -> str:
+    """Return the name of a function without the number of its version."""
+    return re.sub(r"_\d+$", "", name)
 
 
 def _name(name: str) -> str:

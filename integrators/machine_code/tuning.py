@@ -39,3 +39,9 @@ HOT = {
 # Other processors have no such calls.
 HAS_SUCH = platform.machine().lower() in ("x86_64", "amd64", "aarch64", "arm64")
 KEEPING = {"exp"} if HAS_SUCH else set[str]()
+# What these compute side by side is side by side in all loops over the state.
+FLOWS = {"flow", "flow_live"}
+# These read at once what a flow has just stored: side by side where it has stored it so.
+WITH_FLOWS = {"take_step", "weighted_sum"}
+# In these it is rows that are side by side; LLVM finds that itself.
+IN_ROWS = {"observe", "observe_alike"}

@@ -23,6 +23,7 @@ from integrators.machine_code import objects
 from integrators.machine_code.calls import CompiledFunction
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import ArrayValue, NumberValue
+from integrators.machine_code.lanes import MOST_WRITTEN_OUT
 from integrators.machine_code.layout import BlockLayout, OuterArray, parts_of
 from integrators.machine_code.llvm import llvm_text
 from integrators.machine_code.objects import Library, has_wide_vectors, target_name
@@ -52,9 +53,6 @@ __all__ = [
 _compiling = threading.RLock()  # runs may be in several threads
 # Arrays longer than this are not inside the block, and their lengths are variables.
 LONGEST_INSIDE = 64 + 8
-# States side by side from which on vectors save more than they cost: what has been stored one by
-# one is read together late.
-WORTH_VECTORS = 8
 
 
 class RecordArguments(NamedTuple):
@@ -327,7 +325,7 @@ def engine(
     CompiledFunction
         To be called with a block, the largest number of steps, and whether to pause.
     """
-    vectors = vectors or len(arguments.buffers.now.y) >= WORTH_VECTORS
+    vectors = vectors or len(arguments.buffers.now.y) > MOST_WRITTEN_OUT
     record = EntryPoint("entry", columns.record, RECORD, ("steps", "pause"), vectors)
     made = _made(text, arguments, [record], calls, store, notify)
     if more:

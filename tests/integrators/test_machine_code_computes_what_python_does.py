@@ -358,7 +358,73 @@ def truth(g):
     return len(g) + count
 
 
+def beside(g):
+    """Turns that are lanes: branches, sums in order, division where it is wanted only."""
+    found, total, largest = False, 0.0, g.scale
+    for j in range(len(g.out)):
+        found = found or g.i[j] > 7 or (g.flags[j] and g.x[j] > 3.0)
+    b = g.scale
+    for j in range(len(g.out)):
+        a, b = g.x[j], g.scale
+        if g.i[j] > 0:
+            b = a
+        elif g.i[j] & 1 == 0:
+            share = g.scale * g.y[j]
+            b = g.scale - a / share
+            g.out[j] = -share
+        if not (g.flags[j] or a >= b):
+            g.out[j] = min(b, -a) if a < 0.5 else max(b, g.y[j], 0.5)
+        total += abs(a) * b - math.sqrt(abs(b))
+        g.table[1][j] = math.copysign(b, g.y[j])
+    for j in range(len(g.out)):
+        largest = max(largest, g.x[j])
+    g.table[0][0] = total + largest + b  # of the last turn
+    return 1 if found else 0
+
+
+def neighbours(g):
+    """Turns that follow one another: they read or write what another one does."""
+    before = 0.0
+    for j in range(len(g.out)):
+        g.out[j] += before
+        before = g.x[j]
+    for j in range(4):
+        g.table[0][j + 1] = g.table[0][j] + 1.0
+    for j in range(4):
+        g.table[1][j] = g.table[1][j + 1] + 1.0
+    for j in range(4):
+        g.table[2][j] = g.table[2][2] + g.x[j]
+    for j in range(4):
+        g.out[j] += g.scale
+        g.out[j + 1] *= g.scale
+    for j in range(4):
+        if g.flags[j]:
+            before += g.x[j]
+        g.out[j] = g.out[j] + before
+    return 0
+
+
+def shifted(g):
+    """Turns that may write what the next ones read, which only a run knows."""
+    n, by = len(g.out), g.count % 2
+    for j in range(n - by):
+        if g.x[j] > 0.0:
+            g.out[by + j] = g.out[j] + 1.0
+    for j in range(g.count, n):
+        if g.x[j] > 0.0:
+            g.out[j] = g.out[j] * g.scale
+        g.table[0][0] += g.y[j]
+    total = 0.0
+    for j in range(n - 1):
+        if g.flags[j]:
+            g.table[1][j + 1] = g.table[1][j] + 1.0
+        total += g.table[1][j]
+    g.table[2][0] = total
+    return 0
+
+
 CASES = [
+    beside, neighbours, shifted,
     arithmetic, conversions, choices, undefined, functions, loops, records, fields, tables, passed,
     lengths, zeros, returns, now_and_later, once,
     after_loops, truth,
@@ -454,6 +520,50 @@ def test_same_bits(function, made):
         block.update(block.contents)
         assert call(block.address) == result, f"given({seed})"
         assert bits(block.contents) == bits(expected), f"given({seed})"
+
+
+def test_turns_that_do_not_follow_one_another_are_lanes_of_vectors():
+    for function, lanes in ((beside, True), (neighbours, False)):
+        _, module = module_of([function], inside=True)
+        assert ("store <4 x double>" in llvm_text(module)) == lanes
+
+
+def flow(x, dy):
+    dy[0] = x[4]
+    for j in range(4):
+        dy[1 + j] = 2.0 * x[j]
+
+
+def by_number(x, dy):
+    dy[0] = x[4]
+
+
+def take_step(g, slope):
+    slope(g.x, g.out)
+    for j in range(5):
+        g.table[0][j] = g.out[j]
+    return 0
+
+
+def with_flow(g):
+    return take_step(g, flow)
+
+
+def without_flow(g):
+    return take_step(g, by_number)
+
+
+def test_a_step_reads_side_by_side_what_its_flow_has_stored_so():
+    for function, kinds in (
+        (with_flow, ["double", "<4 x double>"]),
+        (without_flow, ["double"] * 5),
+    ):
+        text = llvm_text(module_of([function], inside=True)[1])
+        step = text[text.index(" @take_step(") :]
+        assert (
+            re.findall(r"store (\S*(?: x )?double>?) %t\d+, ptr %t", step.partition("}")[0])
+            == kinds
+        )
 
 
 def test_c_text_leaves_out_what_nobody_reads():

@@ -271,7 +271,12 @@ class ProgramWriter(ABC):
                 rows[state] = [
                     line for line in made if line.text.split(" =")[0] not in seen
                 ] + lines
-        ahead, rows = self.ahead(bank, rows) if len(rows) > 1 else ([], rows)
+        ahead = list[CodeLine]()
+        if len(rows) > 1:
+            states, mode = self.names.states[bank], self.mode(bank)
+            tests = {f"{mode} == {states[state]}": lines for state, lines in rows.items()}
+            ahead, parts = self.ahead(bank, tests, whole=len(rows) == len(states))
+            rows = dict(zip(rows, parts, strict=True))
         body = [*before, *(self.by_state(bank, rows) if rows else []), *after]
         body = [*self.element(bank, first, signs), *body]
         if not body:
@@ -281,34 +286,37 @@ class ProgramWriter(ABC):
         return self.outward(bank, [*ahead, head, *indented(body)])
 
     def ahead(
-        self, bank: int, rows: Mapping[str, list[CodeLine]]
-    ) -> tuple[list[CodeLine], dict[str, list[CodeLine]]]:
-        """Let what takes long be computed before a loop, if a state is active that reads it.
+        self,
+        bank: int,
+        rows: Mapping[str, list[CodeLine]],
+        reads: frozenset[str] = frozenset(),
+        *,
+        whole: bool = False,
+    ) -> tuple[list[CodeLine], list[list[CodeLine]]]:
+        """Let what takes long be computed before a loop, if a test holds by which lines read it.
 
-        Inside the loop machine code would have it, and a test, once for each element.
+        Inside the loop machine code would have it, and a test, once for each element. Returns what
+        is before the loop, and the lines by test, of which one holds for each element if `whole`.
         """
-        readers = dict[str, list[str]]()
-        found = {state: self.lazily(lines) for state, lines in rows.items()}
-        for state, lines in found.items():
-            if lines and not lines[0].text:
-                for name in lines[0].lazy:
-                    readers.setdefault(name, []).append(state)
-                found[state] = lines[1:]
+        readers, found = dict[str, list[str]](), list[list[CodeLine]]()
+        for test, lines in rows.items():
+            first, *rest = self.lazily(lines) or [CodeLine("")]
+            found.append(rest if first.lazy else lines)
+            for name in first.lazy:
+                readers.setdefault(name, []).append(test)
         groups = dict[tuple[str, ...], list[str]]()
         for name in (each for each in self.read.defined if each in readers):
             groups.setdefault((*readers[name],), []).append(name)
-        states, size = self.names.states[bank], self.sizes[bank]
-        made = []
-        for active, names in groups.items():
-            test = " or ".join(f"{self.mode(bank)} == {states[each]}" for each in active)
+        made, size = [], self.sizes[bank]
+        for tests, names in groups.items():
             before = (
                 CodeLine("found = False"),
-                CodeLine(f"for i in range({size}):", frozenset({f"#{size}"})),
-                CodeLine(f"    found = found or {test}"),
+                CodeLine(f"for i in range({size}):", reads | {f"#{size}"}),
+                CodeLine(f"    found = found or {' or '.join(tests)}"),
                 CodeLine("if found:"),
             )
-            every = len(active) == len(states)
-            made.append(CodeLine("", lazy=(*names,), only=() if every else before))
+            always = whole and len(tests) == len(rows)
+            made.append(CodeLine("", lazy=(*names,), only=() if always else before))
         return made, found
 
     def lazily(self, lines: list[CodeLine]) -> list[CodeLine]:

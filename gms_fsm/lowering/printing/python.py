@@ -494,12 +494,15 @@ class _PythonPrinter(LockFunctions):
             for each in (*relations.shared, *relations.own)
             for side in (each.left, each.right)
         )
-        for each in relations.shared:
-            lines += self.margin(each)
+        for head, inner in map(self.margin, relations.shared):
+            lines += [head, *indented(self.lazily(inner))]
         for bank, block in zip(self.read.banks, relations.blocks, strict=True):
-            rows = [line for each in block.names for line in self.margin(each)]
-            if rows:
-                lines += self.loop(bank.index, "live", rows)
+            made = {relations.text(each): self.margin(each) for each in block.names}
+            tests = {f"watch[{index}] != 0": inner for index, (_, inner) in made.items()}
+            ahead, parts = self.ahead(bank.index, tests, reads_of(h for h, _ in made.values()))
+            whole = zip(made.values(), parts, strict=True)
+            rows = [line for (head, _), part in whole for line in (head, *indented(part))]
+            lines += [*ahead, *self.loop(bank.index, "live", rows)]
         return self.function(
             "margins(t, y, mode, p, watch, out)",
             "For each watched comparison, left - right.",
@@ -508,7 +511,7 @@ class _PythonPrinter(LockFunctions):
             within=True,
         )
 
-    def margin(self, comparison: Comparison) -> list[CodeLine]:
+    def margin(self, comparison: Comparison) -> tuple[CodeLine, list[CodeLine]]:
         relations = self.plan.relations
         index = relations.text(comparison)
         sizes = frozenset(f"#{size}" for size in relations.sizes(comparison))
@@ -527,7 +530,7 @@ class _PythonPrinter(LockFunctions):
             seen = {self.local(name) for name in self.closure(inside) & (own - inside)}
             inner = [line for line in made if line.text.split(" =")[0] not in seen] + inner
             inner = [line._replace(reads=line.reads - inside) for line in inner]
-        return [CodeLine(f"if watch[{index}]:", sizes), *indented(self.lazily(inner))]
+        return CodeLine(f"if watch[{index}]:", sizes), inner
 
     def values(self) -> list[str]:
         shown, late = self.layout.shown, []
