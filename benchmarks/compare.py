@@ -94,8 +94,7 @@ def ours(problem: Problem, **how: Any) -> Outcome:
 
 def outcome(problem: Problem, trace: Trace) -> Outcome:
     """Return what is compared of a run."""
-    kept, friction = problem.compared(trace)
-    assert np.isfinite(friction).all()
+    kept, _ = problem.compared(trace)  # reading the friction computes it
     log, edges = trace.firings, trace.program.layout.edges
     return Outcome(log.t, log.machine, [edges[k][0] for k in log.edge.tolist()], kept)
 
