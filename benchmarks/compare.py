@@ -14,6 +14,7 @@ import argparse
 import ctypes
 import datetime
 import functools
+import gc
 import json
 import os
 import platform
@@ -209,11 +210,16 @@ def largest(found: Outcome, right: Outcome) -> float:
 
 
 def seconds(run: Callable[[], object], calls: int = 1) -> float:
-    """Return the time of one call."""
-    start = time.perf_counter()
-    for _ in range(calls):
-        run()
-    return (time.perf_counter() - start) / calls
+    """Return the time of one call, without looking for garbage, which others may have left."""
+    gc.collect()
+    gc.disable()
+    try:
+        start = time.perf_counter()
+        for _ in range(calls):
+            run()
+        return (time.perf_counter() - start) / calls
+    finally:
+        gc.enable()
 
 
 def ms(time_s: float) -> str:
@@ -240,12 +246,13 @@ def measured(problem: Problem, rounds: int) -> tuple[list[Score], str]:
                 f"{found.t.size} of {problem.transitions}",
             )
             cost[name, rows] = seconds(run)
+        gc.freeze()  # what is here stays, and is not looked at again
         turns: dict[tuple[str, bool], dict[int, float]] = {key: {} for key in cost}
         for turn in range(rounds):
             for name, rows, run in field:
                 one = cost[name, rows]
                 if one < 0.3 or turn % 3 == 0:  # slow contestants run in fewer rounds
-                    turns[name, rows][turn] = seconds(run, max(1, int(0.02 / one)))
+                    turns[name, rows][turn] = seconds(run, max(1, int(0.1 / one)))
     scores = []
     for (name, rows), mine in turns.items():
         base = turns.get((C_LOOP, rows))
