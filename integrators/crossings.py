@@ -56,8 +56,8 @@ DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
 # Where more relations are watched, they change one soon after another: steps are aimed at the next
 # change.
 MANY = 500
-# So many relations are compared side by side, also those that are not watched. Fewer are compared
-# sooner one by one, and of more most are not watched.
+# So many relations are compared side by side, also those that are not watched. Fewer are faster one
+# by one, and of more most are not watched.
 FEWEST_BESIDE, MOST_BESIDE = 8, 64
 AIMED = 1.05  # of the time to the next change
 
@@ -142,6 +142,11 @@ def listed(w: Watched, count: int) -> Watched:
     )
 
 
+def are_beside(count: int) -> bool:
+    """Return whether so many relations are compared side by side."""
+    return FEWEST_BESIDE <= count <= MOST_BESIDE
+
+
 def any_changed(w: Watched, margin: Vector) -> bool:
     """Return whether any watched relation differs from its truth value at the arc's start.
 
@@ -150,7 +155,7 @@ def any_changed(w: Watched, margin: Vector) -> bool:
     w : Watched
         The relations and their truth values at the start.
     margin : list of float, shape (r,)
-        Current margins; only the active ones are read.
+        Current margins; only the active ones matter, which are those that `watch` flags.
 
     Returns
     -------
@@ -158,7 +163,7 @@ def any_changed(w: Watched, margin: Vector) -> bool:
         True at the first difference.
     """
     watch, truth, above = w.watch, w.truth, w.above
-    if FEWEST_BESIDE <= len(truth) <= MOST_BESIDE:
+    if are_beside(len(truth)):
         changed = False
         for r in range(len(truth)):
             changed = changed or (watch[r] != 0 and (margin[r] > above[r]) != truth[r])
@@ -172,7 +177,7 @@ def any_changed(w: Watched, margin: Vector) -> bool:
 
 def copy_margins(w: Watched, source: Vector, target: Vector) -> None:
     """Copy the active margins."""
-    if FEWEST_BESIDE <= len(source) <= MOST_BESIDE:
+    if are_beside(len(source)):
         for r in range(len(source)):
             if w.watch[r] != 0:
                 target[r] = source[r]
@@ -454,18 +459,18 @@ def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
 
     Unchanged at both ends.
     """
-    doubtful = True
-    if FEWEST_BESIDE <= len(left) <= MOST_BESIDE:
-        doubtful = False
+    if are_beside(len(left)):
+        turns = False
         for r in range(len(left)):
             first, second = middle[r] - left[r], right[r] - middle[r]
             # More is bent than the smaller one if their signs differ.
             monotone = abs(second - first) < min(abs(first), abs(second))
-            doubtful = doubtful or (w.watch[r] != 0 and not monotone)
-    if doubtful:
-        for r in w.active:
-            if _may_change(w, r, left[r], middle[r], right[r]):
-                return False
+            turns = turns or (w.watch[r] != 0 and not monotone)
+        if not turns:
+            return True
+    for r in w.active:  # noqa: SIM110 - machine code knows no generators
+        if _may_change(w, r, left[r], middle[r], right[r]):
+            return False
     return True
 
 

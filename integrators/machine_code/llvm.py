@@ -16,11 +16,11 @@ from integrators.machine_code.lanes import (
     DECLARED,
     TYPES,
     WIDE,
+    FunctionLoops,
     LaneWriter,
     Turns,
     groups_of,
     operation,
-    turns_of,
 )
 from integrators.machine_code.tree import (
     Address,
@@ -48,10 +48,9 @@ from integrators.machine_code.tree import (
     Put,
     Return,
     Statement,
-    TypedFunction,
     While,
 )
-from integrators.machine_code.tuning import FLOWS, IN_ROWS, KEEPING, WITH_FLOWS
+from integrators.machine_code.tuning import DISTINCT, FLOWS, IN_ROWS, KEEPING, WITH_FLOWS
 
 __all__ = ["llvm_text"]
 
@@ -80,8 +79,11 @@ def llvm_text(module: Module) -> str:
     True
     """
     foreign: dict[str, int] = {}
-    groups = groups_of(module, lambda name: _plain(name) in FLOWS)
-    functions = [_Writer(each, module, foreign, groups).text() for each in module.functions]
+    scopes = [
+        FunctionLoops(each, distinct=_plain(each.name) in DISTINCT) for each in module.functions
+    ]
+    groups = groups_of(each for each in scopes if _plain(each.function.name) in FLOWS)
+    functions = [_Writer(each, module, foreign, groups).text() for each in scopes]
     lines = [_table(table) for table in module.tables]
     for name, kinds in module.outer.items():
         lines.append(f"declare i64 @{name}({', '.join(TYPES[kind] for kind in kinds)})")
@@ -99,9 +101,10 @@ def llvm_text(module: Module) -> str:
         *(f'!{k} = !{{!"{name}", !0}}' for k, name in enumerate(("f", "i", "b", "p"), 1)),
         *(f"!{k + 4} = !{{!{k}, !{k}, i64 0}}" for k in range(1, 5)),
     ]
+    aliases += ["!9 = distinct !{!9, !10}", '!10 = !{!"llvm.loop.unroll.full"}']
+    # Loops that are vectors already, or what is left of them.
     aliases += ["!11 = distinct !{!11, !12, !13}", '!12 = !{!"llvm.loop.unroll.disable"}']
     aliases += ['!13 = !{!"llvm.loop.vectorize.enable", i1 false}']
-    aliases += ["!9 = distinct !{!9, !10}", '!10 = !{!"llvm.loop.unroll.full"}']
     return "\n".join([*lines, *functions, *aliases, ""])
 
 
@@ -137,12 +140,13 @@ class _Writer:
 
     def __init__(
         self,
-        function: TypedFunction,
+        loops: FunctionLoops,
         module: Module,
         foreign: dict[str, int],
         groups: Sequence[tuple[int, int]],
     ) -> None:
-        self.function, self.module, self.foreign, self.groups = function, module, foreign, groups
+        self.turns, self.module, self.foreign, self.groups = loops, module, foreign, groups
+        self.function = function = loops.function
         self.results = dict.fromkeys(module.outer, "i")
         self.results |= {each.name: each.results for each in module.functions}
         self.keeping = {
@@ -313,8 +317,8 @@ class _Writer:
     def counted(self, statement: For) -> None:
         """Write a loop over a range."""
         name = _plain(self.function.name)
-        if name not in IN_ROWS and (turns := turns_of(statement)):
-            if not turns.stop:
+        if name not in IN_ROWS and (turns := self.turns.of(statement)):
+            if turns.bounds is None:
                 self.in_lanes(turns)
                 return
             for first, width in turns.pieces(self.groups, alone=name in WITH_FLOWS):

@@ -45,3 +45,5 @@ FLOWS = {"flow", "flow_live"}
 WITH_FLOWS = {"take_step", "weighted_sum"}
 # In these it is rows that are side by side; LLVM finds that itself.
 IN_ROWS = {"observe", "observe_alike"}
+# Here arrays of different names are different arrays, also where that cannot be seen.
+DISTINCT = {"fit_dense", "interpolate", "margins"} | FLOWS | WITH_FLOWS

@@ -21,7 +21,7 @@ pytest.importorskip("llvmlite")
 
 from integrators import elementary
 from integrators.elementary import asinh, atan, atan2, cos, exp, log, power
-from integrators.machine_code import llvm, objects
+from integrators.machine_code import llvm, objects, tuning
 from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.front_end.translate import HostFunction, TranslationError, Translator
 from integrators.machine_code.front_end.values import ArrayValue, NumberValue
@@ -423,8 +423,65 @@ def shifted(g):
     return 0
 
 
+def of_branches(g):
+    """What a branch has set is read later: after the loop, or in another turn of an outer one."""
+    hit, b, total = False, g.scale, 0.0
+    for j in range(len(g.out)):
+        g.out[j] = -g.x[j]
+        if g.x[j] > 1.0:
+            hit = True
+            b = g.x[j]
+    for k in range(3):
+        total += b
+        for j in range(5):
+            if g.flags[j]:
+                b = g.y[j] * k
+            g.table[0][j] = g.x[j] + total
+    g.table[1][0] = total + b
+    return 1 if hit else 0
+
+
+def following(a, b, n):
+    for j in range(4):
+        b[j + 1] = a[j] + 1.0
+    for j in range(n):
+        b[j] = -a[j] if a[j] > 0.0 else a[j] * a[0]
+
+
+def share(n, k):
+    return n // k
+
+
+def in_place(g):
+    """Arrays of two names that are one, and places that depend on what is written."""
+    following(g.out, g.out, len(g.out))
+    following(g.x, g.table[0], 5)
+    a = g.y if g.count > 2 else g.table[1]
+    for j in range(4):
+        g.table[1][j + 1] = a[j] * 0.5
+    row = g.table[g.count % 3]
+    for j in range(5):
+        row[j] = g.x[j] * g.table[1][2]
+    g.table[2][0] = 0.0
+    for j in range(4):
+        if g.flags[j] or not g.flags[j]:
+            g.table[2][j + int(g.table[2][0])] = 1.0
+    return 0
+
+
+def asked_first(g):
+    """What cannot be computed is not, where it is asked for only if it can."""
+    none, found = g.count - g.count, False
+    for j in range(5):
+        found = found or (g.x[j] > 1e3 and share(7, none) > 1)
+        if g.x[j] > 1e3:
+            g.out[7 // none + j] = 1.0
+        g.out[j] = float(share(7, none)) if g.x[j] > 1e3 else g.x[j]
+    return 1 if found else 0
+
+
 CASES = [
-    beside, neighbours, shifted,
+    beside, neighbours, shifted, of_branches, in_place, asked_first,
     arithmetic, conversions, choices, undefined, functions, loops, records, fields, tables, passed,
     lengths, zeros, returns, now_and_later, once,
     after_loops, truth,
@@ -834,11 +891,12 @@ def test_javascript_has_integers_of_truth_values_and_neighbours():
     assert "function nextafter(" in text
 
 
-def test_what_is_said_about_putting_inline_is_said_about_functions_that_exist():
+def test_what_is_said_of_functions_by_name_is_said_of_functions_that_exist():
     """Those of the loop are in its modules, the others in every generated program."""
     known = {name for module in edition.LOOPS for name in vars(module)}
     program = {"arm", "flow", "flow_live", "jolts", "normal", "observe", "switch", "tick"}
     assert INLINE.keys() - (known - program) == program
+    assert known | program | {"margins"} >= tuning.DISTINCT | tuning.IN_ROWS
 
 
 def test_functions_are_put_inline_as_said_but_not_long_ones(monkeypatch):

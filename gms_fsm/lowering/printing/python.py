@@ -500,8 +500,8 @@ class _PythonPrinter(LockFunctions):
             made = {relations.text(each): self.margin(each) for each in block.names}
             tests = {f"watch[{index}] != 0": inner for index, (_, inner) in made.items()}
             ahead, parts = self.ahead(bank.index, tests, reads_of(h for h, _ in made.values()))
-            whole = zip(made.values(), parts, strict=True)
-            rows = [line for (head, _), part in whole for line in (head, *indented(part))]
+            pairs = zip(made.values(), parts, strict=True)
+            rows = [line for (head, _), part in pairs for line in (head, *indented(part))]
             lines += [*ahead, *self.loop(bank.index, "live", rows)]
         return self.function(
             "margins(t, y, mode, p, watch, out)",
