@@ -56,9 +56,6 @@ DEEPEST = 8  # halvings of a step: windows down to 1/256 of it are found
 # Where more relations are watched, they change one soon after another: steps are aimed at the next
 # change.
 MANY = 500
-# So many relations are compared side by side, also those that are not watched. Fewer are faster one
-# by one, and of more most are not watched.
-FEWEST_BESIDE, MOST_BESIDE = 8, 64
 AIMED = 1.05  # of the time to the next change
 
 
@@ -142,11 +139,6 @@ def listed(w: Watched, count: int) -> Watched:
     )
 
 
-def are_beside(count: int) -> bool:
-    """Return whether so many relations are compared side by side."""
-    return FEWEST_BESIDE <= count <= MOST_BESIDE
-
-
 def any_changed(w: Watched, margin: Vector) -> bool:
     """Return whether any watched relation differs from its truth value at the arc's start.
 
@@ -155,19 +147,14 @@ def any_changed(w: Watched, margin: Vector) -> bool:
     w : Watched
         The relations and their truth values at the start.
     margin : list of float, shape (r,)
-        Current margins; only the active ones matter, which are those that `watch` flags.
+        Current margins; only the active ones are read.
 
     Returns
     -------
     bool
         True at the first difference.
     """
-    watch, truth, above = w.watch, w.truth, w.above
-    if are_beside(len(truth)):
-        changed = False
-        for r in range(len(truth)):
-            changed = changed or (watch[r] != 0 and (margin[r] > above[r]) != truth[r])
-        return changed
+    truth, above = w.truth, w.above
     for r in w.active:
         g = margin[r]
         if (g > above[r]) != truth[r]:
@@ -177,13 +164,8 @@ def any_changed(w: Watched, margin: Vector) -> bool:
 
 def copy_margins(w: Watched, source: Vector, target: Vector) -> None:
     """Copy the active margins."""
-    if are_beside(len(source)):
-        for r in range(len(source)):
-            if w.watch[r] != 0:
-                target[r] = source[r]
-    else:
-        for r in w.active:
-            target[r] = source[r]
+    for r in w.active:
+        target[r] = source[r]
 
 
 def is_quiet_step(motion: ArcMotion, now: Now, t_new: float, scratch: Scratch, w: Watched) -> bool:
@@ -459,28 +441,16 @@ def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
 
     Unchanged at both ends.
     """
-    if are_beside(len(left)):
-        turns = False
-        for r in range(len(left)):
-            first, second = middle[r] - left[r], right[r] - middle[r]
-            # More is bent than the smaller one if their signs differ.
-            monotone = abs(second - first) < min(abs(first), abs(second))
-            turns = turns or (w.watch[r] != 0 and not monotone)
-        if not turns:
-            return True
-    for r in w.active:  # noqa: SIM110 - machine code knows no generators
-        if _may_change(w, r, left[r], middle[r], right[r]):
+    truth, above = w.truth, w.above
+    for r in w.active:
+        a, m, b = left[r], middle[r], right[r]
+        first, second = m - a, b - m
+        bend = abs(second - first)
+        if bend < min(abs(first), abs(second)):  # monotone: the middle is between the ends
+            continue
+        if (m > above[r]) != truth[r]:
+            return False
+        largest = -min(a, m, b) if truth[r] else max(a, m, b)  # of what is negative if unchanged
+        if largest + WARY * bend >= 0.0 and bend > 0.0:
             return False
     return True
-
-
-def _may_change(w: Watched, r: int, a: float, m: float, b: float) -> bool:
-    """Return whether a margin may change between three points."""
-    first, second = m - a, b - m
-    bend = abs(second - first)
-    if bend < min(abs(first), abs(second)):  # monotone: the middle is between the ends
-        return False
-    if (m > w.above[r]) != w.truth[r]:
-        return True
-    largest = -min(a, m, b) if w.truth[r] else max(a, m, b)  # of what is negative if unchanged
-    return largest + WARY * bend >= 0.0 and bend > 0.0

@@ -171,10 +171,6 @@ class FunctionLoops:
     def _reads(self) -> Counter[Local]:
         return _reads_of(self.function.body)
 
-    def reads_elsewhere(self, local: Local, loop: For) -> bool:
-        """Return whether a local is read outside a loop."""
-        return self._reads[local] > _reads_of(loop.body)[local]
-
     def of(self, loop: For) -> Turns | None:
         """Return how the turns of a loop can be lanes; nothing if they cannot, or need not."""
         reader = _LoopReader(loop, self.distinct)
@@ -185,8 +181,8 @@ class FunctionLoops:
             worth_it = bool(reader.folded) or branches
         if loop.step != 1 or not worth_it or (kept := reader.kept()) is None:
             return None
-        lost = reader.assigned - reader.folded - kept  # after the last turn they would be wrong
-        if any(self.reads_elsewhere(each, loop) for each in lost):
+        lost = reader.assigned - reader.folded - kept  # wrong if they are read outside the loop
+        if any(self._reads[each] > reader.reads[each] for each in lost):
             return None
         bounds, varying, apart = reader.bounds, frozenset(reader.varying), tuple(reader.apart)
         return Turns(loop, bounds, varying, frozenset(kept), reader.folded, apart)
@@ -253,8 +249,8 @@ class _LoopReader:
         targets = [each.target for each in made]
         self.assigned = frozenset(targets)
         self.varying = {loop.target, *targets}
-        reads = _reads_of(loop.body)
-        once = {u for u in self.assigned if reads[u] == targets.count(u) == 1}
+        self.reads = _reads_of(loop.body)
+        once = {u for u in self.assigned if self.reads[u] == targets.count(u) == 1}
         self.folded = frozenset(u.target for u in made if u.target in once and _folds(u))
 
     def kept(self) -> set[Local] | None:
