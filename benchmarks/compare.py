@@ -295,7 +295,7 @@ def equal_error(rounds: int) -> Table:
         with tempfile.TemporaryDirectory() as folder:
             loop = c_loop(problem, Path(folder), own=True)
             allowed, rtol = largest(loop(times), right), 1e-9
-            for finer in 10.0 ** -np.arange(9.0, 3.9, -0.125):
+            for finer in 10.0 ** -np.arange(9.0, 3.9, -0.025):
                 run = prepare(*problem.build(), problem.t_end, t_eval=times, rtol=finer)
                 if largest(outcome(problem, run()), right) > allowed:
                     break

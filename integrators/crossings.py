@@ -198,8 +198,6 @@ def is_quiet_step(motion: ArcMotion, now: Now, t_new: float, scratch: Scratch, w
     middle, probe = w.search.y_probe, w.search.probe
     seen = now.seen
     margins(min(t_new, seen), y_new, mode, p, w.watch, w.end)
-    if any_changed(w, w.end):
-        return False
     h = t_new - t
     for j in range(len(y)):
         middle[j] = 0.5 * (y[j] + y_new[j]) + 0.125 * h * (f[j] - f_new[j])
@@ -437,13 +435,12 @@ def _search(path: Path, quiet: float, w: Watched) -> tuple[float, float]:
 
 
 def _is_quiet(w: Watched, left: Vector, middle: Vector, right: Vector) -> bool:
-    """Return whether no margin can have changed at or between three points.
-
-    Unchanged at both ends.
-    """
+    """Return whether no margin has changed at or between three points, after the first one."""
     truth, above = w.truth, w.above
     for r in w.active:
         a, m, b = left[r], middle[r], right[r]
+        if (b > above[r]) != truth[r]:
+            return False
         first, second = m - a, b - m
         bend = abs(second - first)
         if bend < min(abs(first), abs(second)):  # monotone: the middle is between the ends

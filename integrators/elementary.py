@@ -190,20 +190,25 @@ def _scaled(x: float, k: int) -> float:
 
 
 # --------------------------------------------------------------------------- exp and log
-def _exp(x: float, more: float) -> tuple[float, float, int]:
-    """Return h, small, k: e**(x + more) is (h + small) * 2**k, for -746 < x < 746."""
+def _parts(x: float, more: float) -> tuple[float, float, float, int]:
+    """Return root, rest, part, k: e**(x + more) is (root + rest) * (1 + part) * 2**k."""
     n = x * STEPS + WHOLE - WHOLE
     i = int(n)
     upper = x - n * STEP_HI
     lower = more - n * STEP_LO
     r = upper + lower
-    tail = r * r * (0.5 + r * (1.6666666666526087e-1 + r * (4.1666666666226079e-2
-        + r * (8.3333679843421958e-3 + r * 1.3888949086377719e-3))))  # fmt: skip
-    part = upper + (lower + tail)
+    square = r * r
+    tail = square * ((0.5 + r * 1.6666666666526087e-1) + square * ((4.1666666666226079e-2
+        + r * 8.3333679843421958e-3) + square * 1.3888949086377719e-3))  # fmt: skip
     j = i & 31
-    root, rest = ROOTS[j][0], ROOTS[j][1]
+    return ROOTS[j][0], ROOTS[j][1], upper + (lower + tail), i >> 5
+
+
+def _exp(x: float, more: float) -> tuple[float, float, int]:
+    """Return h, small, k: e**(x + more) is (h + small) * 2**k, for -746 < x < 746."""
+    root, rest, part, k = _parts(x, more)
     h, small = _after(root, rest + root * part)
-    return h, small, i >> 5
+    return h, small, k
 
 
 def exp(x: float) -> float:
@@ -219,8 +224,13 @@ def exp(x: float) -> float:
 
 def _powered(x: float, more: float) -> float:
     """Return e**(x + more), for -746 < x < 710."""
-    h, _, k = _exp(x, more)
-    if k > 1000:
+    root, rest, part, k = _parts(x, more)
+    if -900 < k < 1000:  # scaled first, because part is known last
+        scale = _scaled(1.0, k)
+        root, rest = root * scale, rest * scale
+        return root + (rest + root * part)
+    h = root + (rest + root * part)
+    if k > 0:
         return _scaled(h, k - 1000) * 1.0715086071862673e301  # 2**1000
     return _scaled(h, k)
 

@@ -27,6 +27,7 @@ __all__ = [
 SAFETY = 0.9
 LEAST, MOST = 0.2, 10.0  # limits of the change from one step to the next
 LEAST_ROOT = 0.3  # in the memory of the controller
+SHORT, HALF = 0.6, 0.525  # a step with a smaller root; how it grows
 INFINITY = float("inf")
 NO_TOLERANCE = 1e100
 
@@ -132,7 +133,7 @@ def root_of(error: float, order: int) -> float:
 
 
 def next_factor(root: float, memory: float) -> float:
-    """Return the growth factor after an accepted step (PI control).
+    """Return the growth factor after an accepted step: PI control, unless it was far too short.
 
     Parameters
     ----------
@@ -151,7 +152,10 @@ def next_factor(root: float, memory: float) -> float:
     >>> next_factor(root_of(1e-12, 5), 1.0)
     10.0
     """
-    return min(MOST, max(LEAST, SAFETY * memory / root))
+    factor = SAFETY * memory / root
+    if root < SHORT:  # far too short: at once to more than half of what the error allows
+        factor = max(factor, HALF / (root * math.sqrt(root)))
+    return min(MOST, max(LEAST, factor))
 
 
 def memory_of(root: float) -> float:

@@ -118,8 +118,13 @@ class Stribeck:
 
     @property
     def text(self) -> str:
-        """The curve in the expression language; every reader evaluates this text."""
+        """The curve in the expression language."""
         return _TEXTS[self.delta == GAUSSIAN]
+
+    @property
+    def tree(self) -> Value:
+        """The curve as every run computes it: with the inverse of v_s, which waits for nothing."""
+        return _tree(self.text)
 
     @property
     def dip(self) -> float:
@@ -133,7 +138,7 @@ class Stribeck:
 
     def __call__(self, v: ArrayLike) -> FloatArray:
         """Return s(v) [N] for velocities v [m/s] of any shape, computed exactly as in a run."""
-        return values_of(_tree(self.text), {"v": np.asarray(v, dtype=np.float64), **self.numbers})
+        return values_of(self.tree, {"v": np.asarray(v, dtype=np.float64), **self.numbers})
 
 
 # These two are functions of numbers, so that exports can translate them.
@@ -171,4 +176,5 @@ _flat = functools.lru_cache(maxsize=256)(flat_of)  # a curve is asked again for 
 
 @functools.cache
 def _tree(text: str) -> Value:
+    text = text.replace("/ v_s", "* (1 / v_s)")
     return parse_value(text, ("v", *(each.name for each in STRIBECK)))

@@ -483,7 +483,10 @@ class LaneWriter:
         place = self._place(address)
         if mask is not None:
             value = self._chosen(mask, "f", value, self._load("f", place))
-        line = f"  store {_typed('f', self.width)} {value}, ptr {place}, align 8"
+        # Else LLVM would write the lanes of the mask only, and a processor cannot read what is
+        # written so before it has left for the cache.
+        how = "store" if mask is None else "store volatile"
+        line = f"  {how} {_typed('f', self.width)} {value}, ptr {place}, align 8"
         self.writer.lines.append(f"{line}, !tbaa {ALIAS['f']}")
 
     def _fold(self, target: Local, value: Expr) -> None:

@@ -556,10 +556,9 @@ class SystemReader:
         c = contact.name
         given = contact.stribeck
         assert given is not None
-        tree = parse_value(given.text, [*given.numbers, "v"])
         numbers: dict[str, Value] = {name: Name(of(c, f"curve {name}")) for name in given.numbers}
         curve = of(c, "curve S")
-        self.definitions.append(Definition(curve, renamed(tree, numbers | {"v": names["v"]})))
+        self.definitions.append(Definition(curve, renamed(given.tree, numbers | {"v": names["v"]})))
         strength: Value = Name(curve)
         if contact.load is not None:
             least = parse_value(f"max({LOAD}, {LEAST_LOAD!r})", [LOAD])
