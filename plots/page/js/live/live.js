@@ -35,10 +35,18 @@ function ask() {
 
 // ------------------------------------------------------------------ changes
 let settling = 0;
-function changed() {
+function changed(t = NaN) {
   for (const dial of dials.values()) dial.show();
   settle();
-  compute(wordsNow(), showRun);
+  compute(wordsNow(), (found, number) => {
+    showRun(found, number);
+    goAt(t);
+  });
+}
+
+// The last row at a time, if one is given.
+function goAt(t) {
+  if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
 }
 
 // A start in a state that holds a velocity, and it moves: Python refuses it, too.
@@ -267,17 +275,15 @@ function beginLive() {
   compute([], (found) => {
     const base = runOf(0, found, { label: "base run", short: "base", ghost: true }, 1);
     load({ ...data, runs: [runOf(0, found, { label: "this run", short: "now" }, 0), base] });
-    if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
-    if (isChanged()) { changed(); return; }
+    if (isChanged()) { changed(t); return; }
+    goAt(t);
     if (found.stopped) show(frame, found.stopped);
     tellRun();
   }, begun);
   buildPanel(); // meanwhile
   const t = readAddress();
   addEventListener("hashchange", () => {
-    const t = readAddress();
-    changed();
-    if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
+    changed(readAddress());
   });
 }
 
