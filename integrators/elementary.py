@@ -190,25 +190,18 @@ def _scaled(x: float, k: int) -> float:
 
 
 # --------------------------------------------------------------------------- exp and log
-def _parts(x: float, more: float) -> tuple[float, float, float, int]:
-    """Return root, rest, part, k: e**(x + more) is (root + rest) * (1 + part) * 2**k."""
+def _exp(x: float, more: float) -> tuple[float, float, float, int]:
+    """Return root, rest, part, k: e**(x + more) is root + (rest + root * part), times 2**k."""
     n = x * STEPS + WHOLE - WHOLE
     i = int(n)
     upper = x - n * STEP_HI
     lower = more - n * STEP_LO
     r = upper + lower
-    square = r * r
-    tail = square * ((0.5 + r * 1.6666666666526087e-1) + square * ((4.1666666666226079e-2
-        + r * 8.3333679843421958e-3) + square * 1.3888949086377719e-3))  # fmt: skip
+    w = r * r
+    tail = w * (0.5 + r * 1.6666666666526087e-1 + w * (4.1666666666226079e-2
+        + r * 8.3333679843421958e-3 + w * 1.3888949086377719e-3))  # fmt: skip
     j = i & 31
     return ROOTS[j][0], ROOTS[j][1], upper + (lower + tail), i >> 5
-
-
-def _exp(x: float, more: float) -> tuple[float, float, int]:
-    """Return h, small, k: e**(x + more) is (h + small) * 2**k, for -746 < x < 746."""
-    root, rest, part, k = _parts(x, more)
-    h, small = _after(root, rest + root * part)
-    return h, small, k
 
 
 def exp(x: float) -> float:
@@ -224,15 +217,12 @@ def exp(x: float) -> float:
 
 def _powered(x: float, more: float) -> float:
     """Return e**(x + more), for -746 < x < 710."""
-    root, rest, part, k = _parts(x, more)
+    root, rest, part, k = _exp(x, more)
     if -900 < k < 1000:  # scaled first, because part is known last
-        scale = _scaled(1.0, k)
-        root, rest = root * scale, rest * scale
-        return root + (rest + root * part)
+        scale = LOW[(k & 31) + 31] * HIGH[(k >> 5) + 33]
+        return root * scale + (rest * scale + root * scale * part)
     h = root + (rest + root * part)
-    if k > 0:
-        return _scaled(h, k - 1000) * 1.0715086071862673e301  # 2**1000
-    return _scaled(h, k)
+    return _scaled(h, k) if k < 0 else _scaled(h, k - 1000) * 1.0715086071862673e301  # 2**1000
 
 
 def _log(x: float) -> tuple[float, float]:
@@ -565,7 +555,8 @@ def cosh(x: float) -> float:
 
 def _grown(x: float) -> tuple[float, float]:
     """Return e**x / 2."""
-    h, small, k = _exp(x, 0.0)
+    root, rest, part, k = _exp(x, 0.0)
+    h, small = _after(root, rest + root * part)
     return 2.0 * _scaled(h, k - 2), 2.0 * _scaled(small, k - 2)
 
 
@@ -581,10 +572,9 @@ def tanh(x: float) -> float:
             + w * (-0.008863235529902197 + w * 0.003592128036572481)))))  # fmt: skip
     if not size < 22.0:
         return x if x != x else math.copysign(1.0, x)
-    h, small, k = _exp(2.0 * size, 0.0)
-    a, b = _scaled(h, k), _scaled(small, k)
-    top, low = _minus(a, b, 1.0, 0.0)
-    bottom, more = _minus(a, b, -1.0, 0.0)
+    a, b = _grown(2.0 * size)
+    top, low = _minus(a, b, 0.5, 0.0)
+    bottom, more = _minus(a, b, -0.5, 0.0)
     q, e = _ratio_of(top, low, bottom, more)
     return math.copysign(q + e, x)
 

@@ -62,7 +62,7 @@ class Debugger(cmd.Cmd):
     GMS, 4 elements, published law; prescribed velocity, to t = 100 s
     help lists the commands, where shows everything, quit exits.
     (t=0.0000 s) next
-    row 12, t = 4.91276067 s, micro-step 1: v = 141.608 mm/s, F = 1.34657 N
+    row 11, t = 4.91276068 s, micro-step 1: v = 141.608 mm/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
     (t=4.9128 s) quit
     """

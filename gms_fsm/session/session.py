@@ -71,7 +71,7 @@ class Session:
     >>> round(here.t, 3), here.fired.element, here.fired.edge, here.states[0]
     (4.913, 0, 'break_away_forward', 'slip')
     >>> print(here)
-    row 12, t = 4.91276067 s, micro-step 1: v = 141.608 mm/s, F = 1.34657 N
+    row 11, t = 4.91276068 s, micro-step 1: v = 141.608 mm/s, F = 1.34657 N
       element 1: stick -> slip by break_away_forward
 
     In a system elements are named in text, counted from 1: ``why("gear 1")``.
@@ -544,8 +544,8 @@ class Session:
         1
         >>> print(session.compare())
         branches 0 and 1 until t = 30 s: 16 and 16 transitions
-          first different transition at t = 19.3981272 s
-          largest difference: z 598 mm, F 374 mN
+          first different transition at t = 19.3374771 s
+          largest difference: z 599 mm, F 374 mN
         """
         return self.tree.compare(a, b)
 

@@ -190,7 +190,7 @@ def test_without_debugging_it_runs_and_leaves() -> None:
         said = "".join(
             each["body"]["output"] for each in client.seen if each.get("event") == "output"
         )
-        assert "branch 0: 1863 rows" in said
+        assert "branch 0: 1850 rows" in said
 
 
 def test_a_pause_interrupts_a_move() -> None:

@@ -111,6 +111,6 @@ def test_a_tiny_terminal_does_no_harm() -> None:
             await pilot.resize_terminal(*size)
             await settle(pilot)
             await press(pilot, "v", "v", "question_mark", "escape", "d")
-        assert app.commands.session.branch.cursor == 12
+        assert app.commands.session.branch.cursor == 11
 
     drive(action)

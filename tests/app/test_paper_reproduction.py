@@ -100,7 +100,7 @@ CLAIMS = [
     ("proportional to the sample time", r"divides them by 1\.9\d to 2\.0\d", "holds"),
     (
         "… with outputs held between ticks",
-        r"1\.3e-04 N before .*, 2\.0e-04 N .*, 3\.0e-04 N .* 0\.25 N .* 0\.08 N .* 15 of 15",
+        r"1\.3e-04 N before .*, 2\.0e-04 N .*, 3\.1e-04 N .* 0\.25 N .* 0\.08 N .* 15 of 15",
         r"holds only with outputs held .* is explained by them within a factor of 8",
     ),
 ]

@@ -49,7 +49,7 @@ def test_a_light_hears_every_second_press(ran: Ran) -> None:
             green = press + 3.0 + 12.0
     close(l0.times(r.lights, "press"), presses)
     close(l0.times(r.lights, "warn"), warned)
-    close(l0.times(r.lights, "halt"), np.add(warned, 3.0))
+    close(l0.times(r.lights, "halt"), np.add(warned, 3.0), rtol=1e-14)
     assert (r.heard, r.presses, r.red_to_red) == (len(warned), len(presses), 28.0)
 
 

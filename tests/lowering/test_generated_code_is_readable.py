@@ -88,7 +88,7 @@ if found:
     if abs(v) > v_flat:
         S = F_c
     else:
-        S = F_c + (F_s - F_c) * exp(-(v / v_s * (v / v_s)))  # (2)
+        S = F_c + (F_s - F_c) * exp(-(v * (1.0 / v_s) * (v * (1.0 / v_s))))  # (2)
 """
     assert "\n    S = nan  # computed if it is read\n" in source
     assert textwrap.indent(curve, 4 * " ") in source

@@ -364,7 +364,7 @@ def test_tips_of_arrows_are_later_than_tails(once: Trace) -> None:
 @pytest.mark.slow
 def test_the_dot_is_at_the_row_and_both_panels_have_one_colour_bar(once: Trace) -> None:
     in_window = int(np.flatnonzero(once.t <= 6.0)[-1])
-    for row, window, place in ((40, None, 40), (None, None, -1), (None, (2.0, 6.0), in_window)):
+    for row, window, place in ((30, None, 30), (None, None, -1), (None, (2.0, 6.0), in_window)):
         figure = figures.phase(once, row=row, window=window, elements=[0, 1])
         far = 1.0 if window is None else 1e3  # in the window x stays below a metre
         for ax, values in zip(figure.axes, (far * once.x, 1e3 * once.v), strict=False):
