@@ -168,6 +168,8 @@ def sweep(
     # Dask treats tasks with equal arguments as one, and returns an earlier failure as their result.
     name = uuid.uuid4().hex
     with contextlib.ExitStack() as stack:
+        _ready[name] = _repeated(what, begin, columns)
+        stack.callback(_ready.pop, name)
         if executor is None:
             executor = stack.enter_context(_threads())
         shown = stack.enter_context(_bar(runs, progress))
@@ -388,7 +390,9 @@ def _each(
     return results
 
 
-_of_thread = threading.local()  # what a thread has made ready for the sweep that it works at
+# What is ready for a sweep, by its name: in this process, and for one run at a time in a thread.
+_ready: dict[str, RepeatedRuns | None] = {}
+_of_thread = threading.local()
 
 
 def _many(
@@ -400,12 +404,8 @@ def _many(
 ) -> ManyRuns | None:
     """Make the runs whose numbers need no look, all in machine code; None if there are none."""
     if getattr(_of_thread, "sweep_name", "") != sweep_name:
-        runs = None
-        if not signals_of(what).keys() & part.keys():
-            start = begin.start(what)
-            driven = any(body.driven and what.named for body in what.system.bodies)
-            repeatable = start.output == "end" and start.chosen.engine == "compiled" and not driven
-            runs = RepeatedRuns(start) if repeatable else None
+        known = sweep_name in _ready
+        runs = _ready[sweep_name] if known else _repeated(what, begin, part)
         _of_thread.sweep_name, _of_thread.runs, _of_thread.run = sweep_name, runs, None
     cells = None if _of_thread.runs is None else _of_thread.runs.cells(part)
     if cells is None or not cells.certain.any():
@@ -418,6 +418,17 @@ def _many(
     which = np.flatnonzero(cells.certain)
     found = run.many(cells.places, np.ascontiguousarray(cells.values[which]), tables)
     return ManyRuns.of(run.columns.start, which, found)
+
+
+def _repeated(
+    what: Mounted, begin: _Common, values: Mapping[str, NDArray[Any]]
+) -> RepeatedRuns | None:
+    """Return what repeats a run with the numbers of others; None if that is not possible."""
+    driven = any(body.driven and what.named for body in what.system.bodies)
+    if begin.settings.engine != "compiled" or driven or signals_of(what).keys() & values.keys():
+        return None
+    runs = RepeatedRuns(begin.start(what))
+    return runs if runs.start.output == "end" and runs.known is not None else None
 
 
 class _NotDelivered(Exception):

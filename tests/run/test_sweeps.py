@@ -6,8 +6,10 @@ row is the run of `simulate` is in tests/laws/test_a_sweep_is_many_runs.py.
 
 from __future__ import annotations
 
+import copy
 import multiprocessing
 import os
+import pickle
 import signal
 import sys
 import threading
@@ -458,6 +460,18 @@ def test_rows_are_counted_once_where_the_log_grows() -> None:
         simulate(with_values(model, {"F_s": each}), rig, 60.0, engine=FASTEST) for each in values
     ]
     assert coverage(found) == coverage(alone)
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda it: pickle.loads(pickle.dumps(it))])
+def test_the_coverage_of_a_sweep_is_counted_when_it_is_read_or_copied(
+    again: Callable[[Any], Any],
+) -> None:
+    model, rig = stick_slip("signed"), Prescribed("2 * sin(2 * pi * t)")
+    found = sweep(model, rig, 2.0, {"F_s": [1.6, 1.8]}, engine=FASTEST)
+    assert "parts" not in vars(found.coverage)
+    taken = again(found).coverage.contact("").edges
+    assert sum(sum(edge.taken) for edge in taken) == len(found.transitions) > 0
+    assert again(found).coverage == found.coverage
 
 
 @pytest.mark.slow

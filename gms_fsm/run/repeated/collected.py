@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gms_fsm.charts.parameters import FloatArray
+from gms_fsm.foundation.arguments import later
 from gms_fsm.foundation.display import Log
 from gms_fsm.lowering.log_columns import LOG_NUMBERS
 from gms_fsm.lowering.observing import observe
@@ -198,7 +199,7 @@ class Collected:
         self.logs: dict[int, NDArray[Any]] = {}  # by the first run of a chunk
         rows = runs, self.times.size
         self.covered: Coverage | None = None  # so far, from rows
-        self.fired: list[LogCounts] = []  # so far: logs of all runs at once would take memory
+        self.uncovered: list[range] = []  # chunks that only their logs cover
         self.tables = None if self.counted is None else CountTables.empty(self.counted)
         self.rows: dict[str, FloatArray] = {}
         if t_eval is not None:
@@ -238,13 +239,11 @@ class Collected:
             return
         if self.tables is not None and results.tables is not None:
             self.tables.add(results.tables)
-        fired = self._fired(chunk)
-        pairs = zip(self.fired, fired, strict=True)
-        self.fired = [a + b for a, b in pairs] if self.fired else fired
+        self.uncovered.append(chunk)
 
-    def _fired(self, chunk: range) -> list[LogCounts]:
-        """Return what the logs of some runs show of each chart."""
-        run, owner, which = (self.logs[chunk.start][name] for name in ("run", "element", "edge"))
+    def _fired(self, chunk: range, log: NDArray[Any]) -> list[LogCounts]:
+        """Return what the log of some runs shows of each chart."""
+        run, owner, which = (log[name] for name in ("run", "element", "edge"))
         found, element, edge = list[LogCounts](), 0, 0
         for each in self.what.system.machines:
             end = element + each.n
@@ -257,17 +256,22 @@ class Collected:
             element, edge = end, edge + len(each.chart.transitions)
         return found
 
-    def coverage(self) -> Coverage:
-        """Return what all runs have tried."""
+    def coverage(self, log: NDArray[Any]) -> Coverage:
+        """Return what all runs have tried, of which this is the log."""
         contacts = self.what.system.machines
         names = [each.name if self.what.named else "" for each in contacts]
-        if not self.fired:
+        fired: list[LogCounts] = []
+        for chunk in self.uncovered:  # those of all runs at once would take memory
+            begin, end = np.searchsorted(log["run"], (chunk.start, chunk.stop))
+            more = self._fired(chunk, log[begin:end])
+            fired = [a + b for a, b in zip(fired, more, strict=True)] if fired else more
+        if not fired:
             assert self.covered is not None
             return self.covered
-        parts = [of_log(each.chart, log) for each, log in zip(contacts, self.fired, strict=True)]
+        parts = [of_log(each.chart, counts) for each, counts in zip(contacts, fired, strict=True)]
         if self.tables is not None:
-            tables = zip(contacts, self.fired, self.tables.parts(), strict=True)
-            parts = [of_tables(each.chart, log, *part) for each, log, part in tables]
+            tables = zip(contacts, fired, self.tables.parts(), strict=True)
+            parts = [of_tables(each.chart, counts, *part) for each, counts, part in tables]
         own = Coverage(dict(zip(names, parts, strict=True)))
         return own if self.covered is None else self.covered + own
 
@@ -281,6 +285,8 @@ class Collected:
             owners += [each.name] * each.n
             lead = f"{each.name}." if len(contacts) > 1 else ""
             edges += [f"{lead}{edge.name}" for edge in each.chart.transitions]
+        log = np.concatenate([self.logs[k] for k in sorted(self.logs)])
+        self.logs.clear()
         return Sweep(
             parameters,
             self.outcome.astype(np.str_),
@@ -288,11 +294,11 @@ class Collected:
             self.t,
             **self.end,
             states=np.concatenate(states, axis=1),
-            transitions=np.concatenate([self.logs[k] for k in sorted(self.logs)]).view(Log),
+            transitions=log.view(Log),
             edges=tuple(edges),
             times=self.times,
             rows=self.rows,
             ends=self.ends,
             owners=np.array(owners if self.what.named else [], dtype=np.str_),
-            coverage=self.coverage(),
+            coverage=later(Coverage, lambda: self.coverage(log)),
         )

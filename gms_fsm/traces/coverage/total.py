@@ -6,14 +6,23 @@ import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gms_fsm.errors import ParameterError, shown
-from gms_fsm.foundation.arguments import checked_kind, checked_path, listed, refusing, unknown
+from gms_fsm.foundation.arguments import (
+    checked_kind,
+    checked_path,
+    listed,
+    pointing,
+    refusing,
+    unknown,
+)
 from gms_fsm.foundation.display import displayed
 from gms_fsm.traces.coverage.counts import ChartCoverage, Score
 from gms_fsm.traces.coverage.reasons import lines
 
 
+@pointing({})
 @refusing()
 @displayed("html")
 @dataclass(frozen=True)
@@ -50,6 +59,10 @@ class Coverage:
     """
 
     parts: Mapping[str, ChartCoverage]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: that of a sweep is counted when it is read."""
+        return {"parts": self.parts}
 
     def __add__(self, other: Coverage) -> Coverage:
         checked_kind("other", other, Coverage, "a Coverage")
