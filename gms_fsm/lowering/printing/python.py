@@ -197,19 +197,19 @@ class _PythonPrinter(LockFunctions):
 
     def dispatched(self, phases: Sequence[Mapping[str, Phase]]) -> list[CodeLine]:
         """Write one phase of what the edges do, by contact and edge."""
-        lines, several, word = list[CodeLine](), len(self.read.banks) > 1, "if"
+        lines, cases, several = list[CodeLine](), list[Case](), len(self.read.banks) > 1
         for bank, found in zip(self.read.banks, phases, strict=True):
             rows = [Case(k, f"== {k}", phase.lines) for k, phase in found.items()]
             inner = chosen("edge", rows)
             first = self.element(bank.index, self.own(bank.index, reads_of(inner)), "live")
             body = self.outward(bank.index, [*first, *inner])
             if several and inner:
-                first_machine = total(self.sizes[: bank.index])
-                lines.append(CodeLine(f"{word} edge <= {self.names.edges[bank.index][-1]}:"))
-                body = indented([CodeLine(f"i = machine - {first_machine}"), *body])
-                word = "elif"
-            lines += body
-        return lines
+                constants = self.names.edges[bank.index]
+                body.insert(0, CodeLine(f"i = machine - {total(self.sizes[: bank.index])}"))
+                cases.append(Case(constants[0], f"<= {constants[-1]}", body))
+            else:
+                lines += body
+        return [*lines, *chosen("edge", cases)]
 
     def phases(self, bank: Bank, edge: ContactEdge) -> list[Phase]:
         """Write what happens when an edge is taken; every impulse ends a phase."""
