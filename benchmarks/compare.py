@@ -34,6 +34,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from cases import PROBLEMS, Problem, bank, pulled, servo
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter, StrMethodFormatter
 from rivals import PULLED_MASS, RIVALS, Array, Outcome
 
 from gms_fsm import GMS, PulledSlider, Sweep, Trace, prepare, simulate, sweep
@@ -43,6 +46,8 @@ from integrators.machine_code.c99 import c99_text
 from integrators.machine_code.front_end.translate import Translator
 from integrators.machine_code.front_end.values import NumberValue
 from integrators.machine_code.tree import Local
+from plots import figures
+from plots.style import BLUE, RC, VERMILION
 
 ROOT = Path(__file__).resolve().parents[1]
 ROWS = 6001
@@ -323,17 +328,30 @@ def compiled(model: GMS, t_end: float, **how: Any) -> Any:
     return simulate(model, PulledSlider(1.0, 2.0, 0.1), t_end, engine="compiled", **how)
 
 
+class Cost(NamedTuple):
+    """The time of a run of the pulled mass with n elements, s, and how often an edge fires."""
+
+    n: int
+    spread: bool
+    seconds: float
+    transitions: int
+
+
+def cost(n: int, spread: bool) -> Cost:
+    """Measure it."""
+    run = functools.partial(compiled, bank(n, spread), 12.0, output="end")
+    count = len(run().transitions)
+    times = max(1, min(20, 3000 // n))
+    return Cost(n, spread, min(seconds(run) for _ in range(times)), count)
+
+
 def size(rounds: int) -> Table:
     """Measure the cost as a function of the number of elements."""
     table = []
     for n in (1, 10, 100, 1_000, *([10_000] if rounds > 3 else [])):
-        line = [f"{n:,}"]
-        for spread in (False, True):
-            run = functools.partial(compiled, bank(n, spread), 12.0, output="end")
-            count = len(run().transitions)
-            cost = min(seconds(run) for _ in range(3 if n < 10_000 else 1))
-            line += [ms(cost), f"{count:,}"]
-        table.append(tuple(line))
+        both = [cost(n, spread) for spread in (False, True)]
+        cells = [cell for each in both for cell in (ms(each.seconds), f"{each.transitions:,}")]
+        table.append((f"{n:,}", *cells))
     return Table(
         "Cost by number of elements",
         ("elements", "together", "transitions", "spread", "transitions"),
@@ -341,6 +359,26 @@ def size(rounds: int) -> Table:
         'Pulled mass, 12 s (one break-away, one arrest), compiled, `output="end"`. Together: equal '
         "thresholds, all elements switch at one instant. Spread: each switches at its own instant.",
     )
+
+
+def draw_size() -> None:
+    """Write the picture of the cost as a function of the number of elements."""
+    numbers = [each * 10**k for k in range(4) for each in (1, 2, 5)] + [10_000]
+    with rc_context(RC):
+        figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+        ax = figure.subplots()
+        for spread, said, colour, mark in (
+            (True, "elements switch one by one", VERMILION, "s-"),
+            (False, "all switch together", BLUE, "o-"),
+        ):
+            times = [cost(n, spread).seconds for n in numbers]
+            ax.loglog(numbers, times, mark, color=colour, markersize=4, label=said)
+        ax.legend(loc="upper left")
+        ax.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
+        ax.yaxis.set_major_formatter(EngFormatter("s"))
+        ax.set(xlabel="elements", ylabel="time of a run", title="Pulled mass, 12 s, compiled")
+        ax.grid(alpha=0.3)
+    figures.save(figure, ROOT / "docs/images/time_by_elements.png")
 
 
 def length(rounds: int) -> Table:
@@ -719,6 +757,7 @@ def write(rounds: int) -> None:
     """Replace what is between the marks in the documents."""
     for name, text in documents(rounds).items():
         replace(name, text)
+    draw_size()
 
 
 def replace(name: str, text: str) -> None:
