@@ -269,14 +269,19 @@ class Locks:
         bodies = [*dict.fromkeys(body for r in loops for body in self.free(self.rows[r].row))]
         columns, lines = range(len(bodies)), list[CodeLine]()
 
-        def minus(r: int, s: int, pivot: int) -> list[CodeLine]:
-            others = [j for j in columns if j != pivot]
+        def at_pivot(r: int, s: int) -> list[CodeLine]:
+            """Set u to the entry of row r in the pivot column of row s."""
             return [
-                CodeLine(f"u = e_{r}_{pivot}"),
-                *(CodeLine(f"e_{r}_{j} = e_{r}_{j} - u * e_{s}_{j}") for j in others),
-                CodeLine(f"e_{r}_{pivot} = 0.0"),
-                CodeLine(f"g_{r} = g_{r} - u * g_{s}"),
+                CodeLine(f"u = e_{r}_0"),
+                *(CodeLine(f"u = e_{r}_{j} if q_{s} == {j} else u") for j in columns[1:]),
             ]
+
+        def less(r: int, s: int) -> list[CodeLine]:
+            """Subtract row s from row r; as a pivot is 1, what remains in its column is 0."""
+            inside = at_pivot(r, s)
+            inside += [CodeLine(f"e_{r}_{j} = e_{r}_{j} - u * e_{s}_{j}") for j in columns]
+            inside += [CodeLine(f"g_{r} = g_{r} - u * g_{s}")]
+            return [CodeLine(f"if q_{s} >= 0:"), *indented(inside)]
 
         for k, r in enumerate(loops):
             free = self.free(self.rows[r].row)
@@ -290,8 +295,7 @@ class Locks:
                 CodeLine(f"best = {DEPENDENT} * ({size})"),
             ]
             for s in loops[:k]:
-                for j in columns:
-                    lines += [CodeLine(f"if q_{s} == {j}:"), *indented(minus(r, s, j))]
+                lines += less(r, s)
             lines.append(CodeLine(f"q_{r} = -1"))
             for j in columns:
                 lines += [
@@ -299,13 +303,11 @@ class Locks:
                     CodeLine(f"    best = abs(e_{r}_{j})"),
                     CodeLine(f"    q_{r} = {j}"),
                 ]
-            for j in columns:
-                inside = [CodeLine(f"u = e_{r}_{j}"), CodeLine(f"g_{r} = g_{r} / u")]
-                inside += [CodeLine(f"e_{r}_{i} = e_{r}_{i} / u") for i in columns if i != j]
-                inside += [CodeLine(f"e_{r}_{j} = 1.0")]
-                for s in loops[:k]:
-                    inside += minus(s, r, j)
-                lines += [CodeLine(f"if q_{r} == {j}:"), *indented(inside)]
+            inside = [*at_pivot(r, r), CodeLine(f"g_{r} = g_{r} / u")]
+            inside += [CodeLine(f"e_{r}_{j} = e_{r}_{j} / u") for j in columns]
+            lines += [CodeLine(f"if q_{r} >= 0:"), *indented(inside)]
+            for s in loops[:k]:
+                lines += less(s, r)
         for r in loops:
             for j, body in enumerate(bodies):
                 local = self.writer.local(name_of[body])
