@@ -267,29 +267,35 @@ class Locks:
         The rows that hold are known only while it runs, so each has its pivot q found there.
         """
         bodies = [*dict.fromkeys(body for r in loops for body in self.free(self.rows[r].row))]
-        columns, lines = range(len(bodies)), list[CodeLine]()
+        lines, put = list[CodeLine](), self.writer.put
+        columns: dict[int, list[int]] = {}  # of each row, where it may have entries
 
         def at_pivot(r: int, s: int) -> list[CodeLine]:
             """Set u to the entry of row r in the pivot column of row s."""
+            first, *others = columns[s]
             return [
-                CodeLine(f"u = e_{r}_0"),
-                *(CodeLine(f"u = e_{r}_{j} if q_{s} == {j} else u") for j in columns[1:]),
+                CodeLine(f"u = e_{r}_{first}"),
+                *(CodeLine(f"u = e_{r}_{j} if q_{s} == {j} else u") for j in others),
             ]
 
         def less(r: int, s: int) -> list[CodeLine]:
             """Subtract row s from row r; as a pivot is 1, what remains in its column is 0."""
+            if not {*columns[r]} & {*columns[s]}:
+                return []
+            more = [j for j in columns[s] if j not in columns[r]]
+            columns[r] = sorted(columns[r] + more)
             inside = at_pivot(r, s)
-            inside += [CodeLine(f"e_{r}_{j} = e_{r}_{j} - u * e_{s}_{j}") for j in columns]
+            inside += [CodeLine(f"e_{r}_{j} = e_{r}_{j} - u * e_{s}_{j}") for j in columns[s]]
             inside += [CodeLine(f"g_{r} = g_{r} - u * g_{s}")]
-            return [CodeLine(f"if q_{s} >= 0:"), *indented(inside)]
+            filled = [CodeLine(f"e_{r}_{j} = 0.0") for j in more]
+            return [*filled, CodeLine(f"if q_{s} >= 0:"), *indented(inside)]
 
         for k, r in enumerate(loops):
             free = self.free(self.rows[r].row)
-            for j, body in enumerate(bodies):
-                put = self.writer.put
-                lines.append(put(f"e_{r}_{j}", free.get(body, Number(0.0))))
+            columns[r] = [j for j, body in enumerate(bodies) if body in free]
+            lines += [put(f"e_{r}_{j}", free[bodies[j]]) for j in columns[r]]
             text, reads = self.rest(r, free.keys(), name_of, goals)
-            size = " + ".join(f"abs(e_{r}_{j})" for j in columns)
+            size = " + ".join(f"abs(e_{r}_{j})" for j in columns[r])
             lines += [
                 CodeLine(f"g_{r} = {text}", reads),
                 CodeLine(f"best = {DEPENDENT} * ({size})"),
@@ -297,27 +303,27 @@ class Locks:
             for s in loops[:k]:
                 lines += less(r, s)
             lines.append(CodeLine(f"q_{r} = -1"))
-            for j in columns:
+            for j in columns[r]:
                 lines += [
                     CodeLine(f"if l_{r} > 0.0 and abs(e_{r}_{j}) > best:"),
                     CodeLine(f"    best = abs(e_{r}_{j})"),
                     CodeLine(f"    q_{r} = {j}"),
                 ]
             inside = [*at_pivot(r, r), CodeLine(f"g_{r} = g_{r} / u")]
-            inside += [CodeLine(f"e_{r}_{j} = e_{r}_{j} / u") for j in columns]
+            inside += [CodeLine(f"e_{r}_{j} = e_{r}_{j} / u") for j in columns[r]]
             lines += [CodeLine(f"if q_{r} >= 0:"), *indented(inside)]
             for s in loops[:k]:
                 lines += less(s, r)
         for r in loops:
-            for j, body in enumerate(bodies):
-                local = self.writer.local(name_of[body])
+            names = {j: name_of[bodies[j]] for j in columns[r]}
+            for j, name in names.items():
                 terms = [
-                    f" - e_{r}_{i} * {self.writer.local(name_of[other])}"
-                    for i, other in enumerate(bodies)
+                    f" - e_{r}_{i} * {self.writer.local(other)}"
+                    for i, other in names.items()
                     if i != j
                 ]
-                reads = frozenset(name_of[other] for other in bodies)
-                inside = [CodeLine(f"{local} = g_{r}{''.join(terms)}", reads)]
+                text = f"{self.writer.local(name)} = g_{r}{''.join(terms)}"
+                inside = [CodeLine(text, frozenset(names.values()))]
                 lines += [CodeLine(f"if q_{r} == {j}:"), *indented(inside)]
         return lines
 
