@@ -204,6 +204,9 @@ def step_to(functions: Functions, machines: Machines, b: Buffers, sample: Sample
     while now.t < end or not (memory.phase == ARC or memory.phase == SETTLED):
         if sample.waits and memory.phase == JUMPING and b.plan.jumps[memory.jump] >= end:
             break
+        first = memory.phase == ASK and memory.microstep == 0
+        if sample.waits and first and now.t >= end and len(memory.was) > 0:
+            break  # a lock feels how fast its body speeds up, and what is given may have a corner
         t = now.t
         for j in range(len(now.y)):
             sample.before[j] = now.y[j]
@@ -286,8 +289,13 @@ def restart(b: Buffers, clocks: Clocks) -> None:
             clocks.begin, clocks.units = 0.0, float(whole)
     for i in range(len(clocks.made)):
         clocks.made[i] = 0
-    for _k in range(len(plan.jumps)):
+    if len(plan.jumps) > 0:
         next_tick(plan, clocks)
+        if plan.jumps[1] <= t:
+            next_tick(plan, clocks)
+        else:
+            plan.jumps[0] = -INFINITY  # none yet
+            plan.ticks[0] = 0
 
 
 def _begin(functions: Functions, b: Buffers, sample: Sample) -> None:

@@ -18,7 +18,7 @@ from gms_fsm.systems.signals import SignalLike
 from tests.exporters.frictions import servo
 from tests.helpers import FASTEST, stick_slip
 from tests.soak.random_systems import SHAPES
-from tests.soak.stepped_systems import _drawn, differences, samples
+from tests.soak.stepped_systems import _drawn, differences, recorded, samples
 from tests.soak.trying import shaped
 
 DRY = {"F_c": 1.0, "F_s": 1.5, "b": 0.0}
@@ -140,3 +140,31 @@ def test_where_a_formula_rests_is_known_with_the_end() -> None:
     state = stepped(system, times, times, engine="ifelse", t_end=2.0)
     trace = simulate(system, 2.0, inputs={"u": (times, times)}, engine="ifelse")
     assert state.value("x") == trace.body("sled").x[-1]
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 14, 15, 42])
+def test_a_lock_on_a_belt_whose_velocity_jumps_between_samples(seed: int) -> None:
+    """From the first jump on; nor does it feel that nothing is known beyond the end of a sample."""
+    numbers, steps, t = np.random.default_rng(seed), [(0.1, (0.0, 0.3))], 0.1
+    for _ in range(25):
+        t = round(t + float(numbers.uniform(0.05, 0.6)), 3)
+        start, end = numbers.uniform(-1.0, 1.0, 2).tolist()
+        steps.append((t, (start, end if numbers.random() < 0.5 else start)))
+    system = System(
+        "belt",
+        bodies=(
+            Body("belt", velocity="w", x="x_b", v="v_b"),
+            Body("mass", inertia=1.0, force="-5 * x", x="x", v="v"),
+        ),
+        contacts=(
+            Contact("pad", CHARTS["stiction"], {"F_c": 1.0, "F_s": 1.5, "b": 0.1}, v="v - v_b"),
+        ),
+        inputs=("w",),
+    )
+    state, found = SystemState(system, engine="ifelse"), []
+    for end, line in steps:
+        state.advance_to(end, w=line)
+        found += [each.edge for each in state.switches if each.t < t]
+    record = recorded([(end, {"w": line}) for end, line in steps], "w", 0.0)
+    trace = simulate(system, t, inputs={"w": record}, engine="ifelse")
+    assert found == [str(each.edge) for each in trace.transitions if each.t < t]

@@ -131,6 +131,8 @@ def test_a_tick_is_the_double_nearest_to_its_time_also_in_a_run_that_goes_on(
 def stepped(b: Buffers, clocks: Clocks, count: int) -> list[tuple[float, int]]:
     """Return the first ticks of a run without an end."""
     found = []
+    if b.plan.jumps[0] < b.now.t:  # none yet
+        next_tick(b.plan, clocks)
     for _ in range(count):
         found.append((b.plan.jumps[0], b.plan.ticks[0]))
         next_tick(b.plan, clocks)
