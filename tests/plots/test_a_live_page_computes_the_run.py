@@ -184,6 +184,7 @@ def test_an_address_has_the_state_exactly(live: Any) -> None:
         )
         assert {name: found[name] for name in numbers} == numbers
         assert page.evaluate("frames.t[frame]") == time
+        assert "first difference" in page.inner_text("#say")
         page.evaluate(f"location.hash = {text!r}")
         page.reload()
     page.evaluate("location.hash = 'F_s=0.1&nothing=3'")

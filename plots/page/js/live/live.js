@@ -40,14 +40,19 @@ function changed(t = NaN) {
   settle();
   compute(wordsNow(), (found, number) => {
     showRun(found, number);
-    goAt(t);
+    if (!Number.isFinite(t)) return;
+    goAt(t, wordsOf(found));
+    settle(); // the address has the time only now
   });
 }
 
 // The last row at a time, if one is given.
-function goAt(t) {
-  if (Number.isFinite(t)) go(Math.max(lastAt(frames.t, t), 0));
+function goAt(t, words = "") {
+  if (Number.isFinite(t)) show(Math.max(lastAt(frames.t, t), 0), words);
 }
+
+// What is said of a run at first.
+const wordsOf = (found) => found.stopped || (isChanged() ? first.told : "");
 
 // A start in a state that holds a velocity, and it moves: Python refuses it, too.
 function movesLocked(run) {
@@ -65,7 +70,7 @@ function movesLocked(run) {
 function showRun(found, number) {
   if (runs[0].engineNumber === number) {
     runs[0].renew(found);
-    renew(() => found.stopped || (isChanged() ? first.told : ""));
+    renew(() => wordsOf(found));
   } else {
     load({ ...data, runs: [runOf(number, found, { label: "this run", short: "now" }, 0), runs[1]] });
     show(frame, found.stopped || first.told);
