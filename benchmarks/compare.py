@@ -371,8 +371,8 @@ def draw_size() -> None:
             (True, "elements switch one by one", VERMILION, "s-"),
             (False, "all switch together", BLUE, "o-"),
         ):
-            times = [cost(n, spread).seconds for n in numbers]
-            ax.loglog(numbers, times, mark, color=colour, markersize=4, label=said)
+            spent = [cost(n, spread).seconds for n in numbers]
+            ax.loglog(numbers, spent, mark, color=colour, markersize=4, label=said)
         ax.legend(loc="upper left")
         ax.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         ax.yaxis.set_major_formatter(EngFormatter("s"))

@@ -153,7 +153,7 @@ def next_factor(root: float, memory: float) -> float:
     10.0
     """
     factor = SAFETY * memory / root
-    if root < SHORT:  # far too short: at once to more than half of what the error allows
+    if root < SHORT:  # far too short: at once to about half of what the error allows
         factor = max(factor, HALF / (root * math.sqrt(root)))
     return min(MOST, max(LEAST, factor))
 

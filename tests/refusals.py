@@ -1590,6 +1590,7 @@ rows = {
     "curve with F_c = NAN": (curve, {"F_c": NAN}),
     "curve with F_s = INF": (curve, {"F_s": INF}),
     "curve with v_s = 0": (curve, {"v_s": 0}),
+    "curve with v_s = 1e-310": (curve, {"v_s": 1e-310}),
     "curve with v_s = 'fast'": (curve, {"v_s": "fast"}),
     "curve with v_s = None": (curve, {"v_s": None}),
     "bank with k = (40, 0)": (bank, {"k": (40, 0)}),

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gms_fsm.charts.parameters import STRIBECK, FloatArray, checked_values
+from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import refusing
 from gms_fsm.language import Value, parse_value, values_of
 from integrators import elementary
@@ -28,6 +29,7 @@ from integrators import elementary
 DIP_WIDTH = 6.1  # in v_s: beyond this exp(-(v/v_s)**2) is below 1e-16 and the curve is flat
 GAUSSIAN = 2.0  # the exponent of eq. (2)
 FINEST = 2.0**55  # its inverse is a quarter of the last bit of 1
+TINY = 1e-300
 INFINITY = math.inf
 
 
@@ -107,6 +109,12 @@ class Stribeck:
     def __post_init__(self) -> None:
         for name, value in checked_values(STRIBECK, vars(self)).items():
             object.__setattr__(self, name, value)
+        if self.v_s < TINY:
+            raise ParameterError(
+                f"one over it is infinite; it must be at least {TINY:g}",
+                place="v_s",
+                value=self.v_s,
+            )
 
     @property
     def numbers(self) -> Mapping[str, float]:
@@ -123,7 +131,7 @@ class Stribeck:
 
     @property
     def tree(self) -> Value:
-        """The curve as every run computes it: with the inverse of v_s, which waits for nothing."""
+        """The curve as runs compute it, with v * (1 / v_s): the division does not wait for v."""
         return _tree(self.text)
 
     @property

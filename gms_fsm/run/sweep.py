@@ -390,9 +390,9 @@ def _each(
     return results
 
 
-# What is ready for a sweep, by its name: in this process, and for one run at a time in a thread.
+# What all threads of this process share for a sweep, by its name; None if it repeats no run.
 _ready: dict[str, RepeatedRuns | None] = {}
-_of_thread = threading.local()
+_of_thread = threading.local()  # what a thread has made ready for the sweep that it works at
 
 
 def _many(
@@ -404,8 +404,10 @@ def _many(
 ) -> ManyRuns | None:
     """Make the runs whose numbers need no look, all in machine code; None if there are none."""
     if getattr(_of_thread, "sweep_name", "") != sweep_name:
-        known = sweep_name in _ready
-        runs = _ready[sweep_name] if known else _repeated(what, begin, part)
+        try:
+            runs = _ready[sweep_name]
+        except KeyError:  # in another process
+            runs = _repeated(what, begin, part)
         _of_thread.sweep_name, _of_thread.runs, _of_thread.run = sweep_name, runs, None
     cells = None if _of_thread.runs is None else _of_thread.runs.cells(part)
     if cells is None or not cells.certain.any():

@@ -73,8 +73,8 @@ def test_a_motion_that_fits_has_none():
         ),
         (
             bank(v_c=1e-2),
-            "1e-3*sin(t)",
-            r"no transition: the speed stays below v_c \(largest .v. 99. µm/s, v_c",
+            [(0.0, 0.0), (2.0, 1e-3), (4.0, -1e-3), (5.0, 0.0)],
+            r"no transition: the speed stays below v_c \(largest .v. 1 mm/s, v_c",
         ),
         (  # the thresholds are millimetres, and a stroke of micrometres does not come near them
             bank(k=1e-3),

@@ -474,6 +474,14 @@ def test_the_coverage_of_a_sweep_is_counted_when_it_is_read_or_copied(
     assert again(found).coverage == found.coverage
 
 
+def test_coverage_does_not_depend_on_what_is_done_to_the_log_before() -> None:
+    model, rig = stick_slip("signed"), Prescribed("2 * sin(2 * pi * t)")
+    first, second = (sweep(model, rig, 2.0, {"F_s": [1.6, 1.8]}, engine=FASTEST) for _ in "ab")
+    first.transitions.sort(order="t")
+    first.transitions["edge"][:] = 0
+    assert first.coverage == second.coverage
+
+
 @pytest.mark.slow
 def test_no_sequence_of_two_hundred_depends_on_the_tolerance() -> None:
     """About 72 transitions each: the same elements by the same edges in the same order."""

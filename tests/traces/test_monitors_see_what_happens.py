@@ -223,7 +223,7 @@ def test_a_break_at_an_edge_is_on_the_row_after_it() -> None:
 
 def test_invariants_can_test_states() -> None:
     model = one_element("signed", F_c=1.0, F_s=1.0, sigma=1.0, C=0.1)
-    texts = ["state == stick", "state(1) != slip", "state == slip or abs(z) <= 1.001*s"]
+    texts = ["state == stick", "state(1) != slip", "state == slip or abs(z) <= (1 + 1e-12)*s"]
     trace = simulate(model, Prescribed(0.2), 8.0, monitors=texts)
     own, first, both = (invariant(trace, text) for text in texts)
     assert own.t == first.t == trace.transitions.t[0]

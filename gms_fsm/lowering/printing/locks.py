@@ -505,11 +505,11 @@ class Locks:
                 }
                 guard = spell(edge.guard, rename=dict(self.writer.names.texts) | pushed)
                 state = self.writer.names.states[bank.index][edge.source]
-                first_one = "again == 0 and " if lines else ""  # not elif: thousands nest too deep
+                none_yet = "again == 0 and " if lines else ""  # not elif: hundreds nest too deep
                 free = f"hit == 2 and keep_{first[0]} > 0.0 and set_{first[0]} == 0.0"
                 reads = computed_names(edge.guard) - {*bank.forces}
                 lines.append(
-                    CodeLine(f"if {first_one}{free} and {place} == {state} and ({guard}):", reads)
+                    CodeLine(f"if {none_yet}{free} and {place} == {state} and ({guard}):", reads)
                 )
                 lines += [CodeLine(f"    keep_{r} = 0.0") for r in first]
                 lines.append(CodeLine("    again = 1"))

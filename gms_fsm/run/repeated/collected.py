@@ -241,9 +241,9 @@ class Collected:
             self.tables.add(results.tables)
         self.uncovered.append(chunk)
 
-    def _fired(self, chunk: range, log: NDArray[Any]) -> list[LogCounts]:
-        """Return what the log of some runs shows of each chart."""
-        run, owner, which = (log[name] for name in ("run", "element", "edge"))
+    def _fired(self, chunk: range, *log: NDArray[Any]) -> list[LogCounts]:
+        """Return what the log of some runs shows of each chart: runs, elements, and edges."""
+        run, owner, which = log
         found, element, edge = list[LogCounts](), 0, 0
         for each in self.what.system.machines:
             end = element + each.n
@@ -256,14 +256,14 @@ class Collected:
             element, edge = end, edge + len(each.chart.transitions)
         return found
 
-    def coverage(self, log: NDArray[Any]) -> Coverage:
-        """Return what all runs have tried, of which this is the log."""
+    def coverage(self, *log: NDArray[Any]) -> Coverage:
+        """Return what all runs have tried; their log is that of `_fired`."""
         contacts = self.what.system.machines
         names = [each.name if self.what.named else "" for each in contacts]
         fired: list[LogCounts] = []
         for chunk in self.uncovered:  # those of all runs at once would take memory
-            begin, end = np.searchsorted(log["run"], (chunk.start, chunk.stop))
-            more = self._fired(chunk, log[begin:end])
+            begin, end = np.searchsorted(log[0], (chunk.start, chunk.stop))
+            more = self._fired(chunk, *(column[begin:end] for column in log))
             fired = [a + b for a, b in zip(fired, more, strict=True)] if fired else more
         if not fired:
             assert self.covered is not None
@@ -287,6 +287,7 @@ class Collected:
             edges += [f"{lead}{edge.name}" for edge in each.chart.transitions]
         log = np.concatenate([self.logs[k] for k in sorted(self.logs)])
         self.logs.clear()
+        counted = [log[name].copy() for name in ("run", "element", "edge")]  # it may be changed
         return Sweep(
             parameters,
             self.outcome.astype(np.str_),
@@ -300,5 +301,5 @@ class Collected:
             rows=self.rows,
             ends=self.ends,
             owners=np.array(owners if self.what.named else [], dtype=np.str_),
-            coverage=later(Coverage, lambda: self.coverage(log)),
+            coverage=later(Coverage, lambda: self.coverage(*counted)),
         )
