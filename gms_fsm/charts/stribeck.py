@@ -111,7 +111,7 @@ class Stribeck:
             object.__setattr__(self, name, value)
         if self.v_s < TINY:
             raise ParameterError(
-                f"one over it is infinite; it must be at least {TINY:g}",
+                f"it must be at least {TINY:g}: one over it would be infinite",
                 place="v_s",
                 value=self.v_s,
             )

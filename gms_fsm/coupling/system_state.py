@@ -24,8 +24,8 @@ class SystemState:
 
     In each sample an input is held, or a straight line; every switch within is located. The result
     is that of `simulate` with the same inputs as records, to the last bit. The tick of a sampler at
-    the end of a sample belongs to the next one, which may bring other inputs. One thread at a time
-    may call it.
+    the end of a sample belongs to the next one, which may bring other inputs; so does a switch just
+    there, if the system has locks. One thread at a time may call it.
 
     Parameters
     ----------

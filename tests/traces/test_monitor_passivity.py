@@ -250,7 +250,10 @@ def exactly() -> PassivityVerdict:
     ids=str,
 )
 def test_the_tolerance_covers_the_error_of_the_sums(options: dict[str, object]) -> None:
-    """Coarse steps or few rows give the same energies as fine ones, within the stated tolerance."""
+    """Coarse steps or few rows give the same energies as fine ones, within the stated tolerance.
+
+    Steps that are coarser still give another motion.
+    """
     model, rig = stick_slip("published"), Prescribed(FIG4_SINE)
     fine = exactly()
     options = {"engine": FASTEST, "monitors": [Passivity(1e-3)], **options}
