@@ -78,7 +78,7 @@ def test_keys_find_out_why_on_a_small_screen() -> None:
         await press(pilot, "3", "left")
         assert _row(app) == 7
         await press(pilot, "1", "2", ".", "5", "g")
-        assert app.said[-2].startswith("row 34, t = 12.4999735 s")
+        assert app.said[-2].startswith("row 30, t = 12.4999735 s")
         await press(pilot, "3", "e")
         assert app.commands.element == 2
         await press(pilot, "9", "e")

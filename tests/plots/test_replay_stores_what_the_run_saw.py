@@ -95,7 +95,7 @@ def test_the_page_of_fig_4_is_small_and_complete() -> None:
 
 @pytest.mark.matrix
 def test_800_000_rows_with_30_000_transitions_fit_into_5_megabytes() -> None:
-    trace = simulate(*pulled_mass(), 23_000.0, engine=FASTEST)
+    trace = simulate(*pulled_mass(), 23_100.0, engine=FASTEST)
     assert len(trace) > 800_000
     page = replay_html(trace)
     assert len(page.encode()) < 5_000_000
