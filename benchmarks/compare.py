@@ -328,21 +328,12 @@ def compiled(model: GMS, t_end: float, **how: Any) -> Any:
     return simulate(model, PulledSlider(1.0, 2.0, 0.1), t_end, engine="compiled", **how)
 
 
-class Cost(NamedTuple):
-    """The time of a run of the pulled mass with n elements, s, and how often an edge fires."""
-
-    n: int
-    spread: bool
-    seconds: float
-    transitions: int
-
-
-def cost(n: int, spread: bool) -> Cost:
-    """Measure it."""
+def cost(n: int, spread: bool) -> tuple[float, int]:
+    """Return the time of a run with n elements, s, and how often an edge fires."""
     run = functools.partial(compiled, bank(n, spread), 12.0, output="end")
     count = len(run().transitions)
     times = max(1, min(20, 3000 // n))
-    return Cost(n, spread, min(seconds(run) for _ in range(times)), count)
+    return min(seconds(run) for _ in range(times)), count
 
 
 def size(rounds: int) -> Table:
@@ -350,7 +341,7 @@ def size(rounds: int) -> Table:
     table = []
     for n in (1, 10, 100, 1_000, *([10_000] if rounds > 3 else [])):
         both = [cost(n, spread) for spread in (False, True)]
-        cells = [cell for each in both for cell in (ms(each.seconds), f"{each.transitions:,}")]
+        cells = [cell for time_s, count in both for cell in (ms(time_s), f"{count:,}")]
         table.append((f"{n:,}", *cells))
     return Table(
         "Cost by number of elements",
@@ -371,7 +362,7 @@ def draw_size() -> None:
             (True, "elements switch one by one", VERMILION, "s-"),
             (False, "all switch together", BLUE, "o-"),
         ):
-            spent = [cost(n, spread).seconds for n in numbers]
+            spent = [cost(n, spread)[0] for n in numbers]
             ax.loglog(numbers, spent, mark, color=colour, markersize=4, label=said)
         ax.legend(loc="upper left")
         ax.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 FloatArray: TypeAlias = NDArray[np.float64]
 
 ANY = "finite"  # the rule that applies to every number
+TINY = 1e-300  # one over a number that is not larger might be infinite
 FEW = 16  # numbers that are looked at one by one in less time than NumPy's functions take
 _HOLDS: Mapping[str, Callable[[Any, Any], Any]] = {
     ">=": operator.ge,

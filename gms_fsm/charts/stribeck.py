@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gms_fsm.charts.parameters import STRIBECK, FloatArray, checked_values
+from gms_fsm.charts.parameters import STRIBECK, TINY, FloatArray, checked_values
 from gms_fsm.errors import ParameterError
 from gms_fsm.foundation.arguments import refusing
 from gms_fsm.language import Value, parse_value, values_of
@@ -29,7 +29,6 @@ from integrators import elementary
 DIP_WIDTH = 6.1  # in v_s: beyond this exp(-(v/v_s)**2) is below 1e-16 and the curve is flat
 GAUSSIAN = 2.0  # the exponent of eq. (2)
 FINEST = 2.0**55  # its inverse is a quarter of the last bit of 1
-TINY = 1e-300
 INFINITY = math.inf
 
 

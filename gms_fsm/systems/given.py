@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from gms_fsm.charts.chart import Chart
-from gms_fsm.charts.parameters import FloatArray, check_names, checked_values
+from gms_fsm.charts.parameters import TINY, FloatArray, check_names, checked_values
 from gms_fsm.errors import ParameterError, Part, shown
 from gms_fsm.language import (
     CONSTANTS,
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from gms_fsm.systems.parts import Body
 
 ZERO = Number(0.0)
-TINY = 1e-300  # an inertia that is not larger counts as 0: one over it might be infinite
 WORDS = {*FUNCTIONS, *CONSTANTS, "pow"} - {*YIELDING}  # of the language
 Text: TypeAlias = str | float  # an expression, or just a number
 

@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gms_fsm.charts.parameters import Bound, fixed_bounds, relative_bounds
+from gms_fsm.charts.parameters import TINY, Bound, fixed_bounds, relative_bounds
 from gms_fsm.foundation.arguments import unknown
 from gms_fsm.gradients.directions import Directions
 from gms_fsm.language import Name, Value, names_in
 from gms_fsm.run.problem import Problem
 from gms_fsm.run.repeated.block import Place, RepeatedRun
 from gms_fsm.systems import rigs
-from gms_fsm.systems.given import TINY, is_positive
+from gms_fsm.systems.given import is_positive
 from gms_fsm.systems.mounted import Mounted
 from gms_fsm.systems.numbers import joined, known_in, label_in, numbers_of, varied
 from gms_fsm.systems.reading.values import CURVE
